@@ -14,22 +14,25 @@ import numpy as np
 import xarray as xr
 
 from brakecli.analysis.over_time import Vibration
+from brakecli.analysis.probability import Probability
 from brakecli.analysis.regime.bursts import Burst
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete
 from brakecli.cli.file_tables import diff_table
 from brakecli.cli.stability_tables import advice_table
-from brakecli.cli.tables import Row, text_of, two_columns, verdict_table
+from brakecli.cli.tables import Row, attractors_table, text_of, two_columns, verdict_table
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
-from brakecli.files.as_xarray import stored
+from brakecli.files.as_xarray import of_sweep, stored
 from brakecli.files.contents import Difference
 from brakecli.files.field import Field, values_of
 from brakecli.runs.advise import AdviceReport
 from brakecli.solver.steady_sliding import SteadySliding
+from brakecli.sweeps.attractors import Attractor
 
 _Record = TypeVar("_Record")
 _APART = {
+    "attractors",
     "modes",
     "crossings",
     "equilibrium",
@@ -141,6 +144,14 @@ class Accessor(Shown):
         columns = [held[each.name].values.tolist() for each in fields.VIBRATION]
         return tuple(Vibration(*map(_known, row)) for row in zip(*columns, strict=True))
 
+    @property
+    def attractors(self) -> tuple[Attractor, ...]:
+        """Of a sweep over initial states: regime, amplitude (m), frequency (Hz), share of each attractor."""
+        found = of_sweep(self._found) if isinstance(self._found, xr.DataTree) else self._found
+        given = json.loads(found.attrs.get("attractors", "[]"))
+        parts = ("share", "share_lower", "share_upper")
+        return tuple(Attractor(share=Probability(*map(one.pop, parts)), **one) for one in given)
+
     def table(self) -> str:
         """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, less evidence."""
         single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
@@ -157,7 +168,9 @@ class Accessor(Shown):
         rows += [("mode", f"{each.frequency:.5g} Hz, {each.growth:+.4g} 1/s") for each in self.modes]
         branches = [each for each in self._groups.values() if "kind" in each.attrs]
         rows += [(str(each.name), f"{each.attrs['kind']}, {each.sizes['point']} motions") for each in branches]
-        return two_columns(title, [*rows, ("note", [*self._texts("notes"), *self.warnings])])
+        notes = ("note", [*self._texts("notes"), *self.warnings])
+        listed = [attractors_table(self.attractors)] if self.attractors else []
+        return "\n\n".join([*listed, two_columns(title, [*rows, notes])])
 
     def _repr_png_(self) -> bytes | None:
         from brakecli.plots.result import plot_result

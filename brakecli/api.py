@@ -261,7 +261,7 @@ def sweep(
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         from brakecli.cli.inputs import load_sweep
-        from brakecli.files.as_xarray import opened
+        from brakecli.files.as_xarray import of_sweep, opened
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, counting, sweep
         from brakecli.sweeps.listed import GIVEN
@@ -290,7 +290,7 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
-        return opened(path, own=True).to_dataset()
+        return of_sweep(opened(path, own=True))
 
 
 def _axes(axes: Any, direction: Any) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ import pytest
 import xarray as xr
 
 import brakecli
+from brakecli.case.read import starters
 from brakecli.cli.output import telling
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from tests.commands import QUICK, ROOT, TINY
@@ -609,3 +610,28 @@ def test_what_comes_from_a_damaged_file_stays_marked(tmp_path: Path) -> None:
     for drawn, marked in ((tree, True), (brakecli.run(CASE, SHORT), False)):
         texts = [text.get_text() for text in brakecli.plot(drawn).texts]
         assert ("read by force: a digest does not fit" in texts) is marked
+
+
+@pytest.mark.filterwarnings("ignore:.*digest")
+@pytest.mark.usefixtures("compiled")
+def test_attractors_of_a_sweep_in_memory_are_drawn_reported_saved_and_read_as_records(tmp_path: Path) -> None:
+    (tmp_path / "branch.toml").write_text(starters()["branch"])
+    axes = {"initial.vy": [0.0, 3e-3]}
+    found = brakecli.sweep(
+        tmp_path / "branch.toml", {"solver.duration": 5.0}, axes=axes, output=tmp_path / "a.h5", jobs=1
+    )
+    with xr.open_dataset(tmp_path / "a.h5", engine="h5netcdf", group="attractors") as table:
+        shares, amplitudes = table.share.values.tolist(), table.amplitude.values.tolist()
+    assert shares
+    found.to_netcdf(tmp_path / "saved.h5", engine="h5netcdf")
+    of_file, saved = brakecli.load(tmp_path / "a.h5"), brakecli.load(tmp_path / "saved.h5")
+    for each in (found, of_file, saved):
+        assert [one.share.value for one in each.brakecli.attractors] == shares
+        assert [one.amplitude for one in each.brakecli.attractors] == amplitudes
+        assert "95 % interval" in repr(each.brakecli)
+        words = f"{shares[0]:.1%} of the points"
+        assert brakecli.plot(each).axes
+        assert words in brakecli.report(each)
+    found.attrs["attractors"] = "[1]"
+    with pytest.raises(UnreadableResultError, match="is not a list of attractors"):
+        brakecli.plot(found)

@@ -284,6 +284,8 @@ def _fits(field: Field, value: Any) -> bool:
     whole = isinstance(value, int)
     if field.kind[0] == "f":
         return (whole or isinstance(value, float)) and abs(value) <= LARGEST_IN_HISTORY
+    if field.rows and isinstance(value, str):  # of a dataset that xarray has saved: JSON
+        return True
     if field.kind[0] == "i" or field.rows:
         return whole
     if field.kind != fields.OBJECT:

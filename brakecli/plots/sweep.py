@@ -1,5 +1,6 @@
 """What curves and maps of a sweep share: numbers over rising axes, missing ones as NaN; heading, legend, looks."""
 
+import json
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -255,10 +256,18 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
 def _attractors(result: StoredResult) -> Iterator[str]:
     """Number, regime, frequency, amplitude and share of each attractor."""
     names = ("regime", "frequency", "amplitude", "share")
-    columns = (style.read_column(result, name, "attractors").tolist() for name in names)
-    for number, (regime, frequency, amplitude, share) in enumerate(zip(*columns, strict=True), start=1):
+    if isinstance(saved := result.attributes.get("attractors"), str):  # by xarray, without groups
+        try:
+            rows = [
+                (str(one["regime"]), *(float(one[name] or 0.0) for name in names[1:])) for one in json.loads(saved)
+            ]
+        except (ValueError, TypeError, LookupError, RecursionError) as error:
+            raise style.unreadable(result, "its attribute attractors is not a list of attractors") from error
+    else:
+        rows = [*zip(*(style.read_column(result, name, "attractors").tolist() for name in names), strict=True)]
+    for number, (regime, frequency, amplitude, share) in enumerate(rows, start=1):
         factor, unit = style.prefixed(amplitude, "m")
-        tone = f", {frequency:.4g} Hz" if np.isfinite(frequency) else ""
+        tone = f", {frequency:.4g} Hz" if frequency > 0.0 else ""
         size = f", {factor * amplitude:.3g} {unit}" if amplitude else ""
         yield f"{number}: {regime}{tone}{size}, {share:.1%} of the points"
 
