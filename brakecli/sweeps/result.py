@@ -1,6 +1,7 @@
 """The result of a sweep: what its file holds, and what the command reports of it."""
 
 import math
+import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -30,6 +31,8 @@ MOST_FAILURES = 100
 MOST_AS_JSON = 10_000  # points; of more the file alone holds every number
 WIDE = 0.1  # of the range, from which on an error bar is named
 _DONE = Status.DONE.encode()
+_NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")  # by which sentences of one kind differ
+_LONGER = re.compile(rf"run at least ({_NUMBER.pattern}) s")
 
 
 class Findings:
@@ -59,6 +62,7 @@ class Findings:
         if plan.passes == 2:
             self.hysteresis, self.sentences = _hysteresis(journal)
         self.sentences += on_short_runs(journal)
+        self.sentences += _on_undecided(journal)
         if plan.sweep.critical is not None:
             values = journal.column("critical")
             known = values[~np.isnan(values)]
@@ -203,6 +207,22 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
         undecided = f"{size - decided} points, {which}"
         said.append(f"hysteresis is not known at {undecided}{ways}")
     return differ.astype(np.int64), said
+
+
+def _on_undecided(journal: Journal) -> Iterator[str]:
+    """Where a quarter of the points or more are undecided: the most frequent reason, and what to do."""
+    undecided = (journal.column("regime") == b"undecided") & (journal.column("status") == _DONE)
+    count, size = int(undecided.sum()), undecided.size
+    if journal.plan.sweep.critical is not None or 4 * count < size or not count:
+        return
+    alike: dict[str, list[str]] = {}
+    for each in journal.column("reason")[undecided].tolist():
+        alike.setdefault(_NUMBER.sub("", each.decode()), []).append(each.decode())
+    most = max(alike.values(), key=len)
+    longest = max(most, key=lambda text: float(found[1]) if (found := _LONGER.search(text)) else 0.0)
+    by_itself = journal.plan.case({}).solver.duration == "settled"
+    remedy = '; solver.duration = "settled" runs as long as each needs' * ("run " in longest and not by_itself)
+    yield f"{count} of {size} points are undecided, {len(most)} of them: {longest}{remedy}"
 
 
 def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:

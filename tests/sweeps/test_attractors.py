@@ -197,3 +197,16 @@ def test_a_file_whose_attractors_do_not_fit_is_not_read(tmp_path: Path) -> None:
         file["attractors"]["share"] = np.ones(5)
     with pytest.raises(UnreadableResultError):
         open_result(tmp_path / "s.h5", kind="sweep").__enter__()
+
+
+def test_many_undecided_points_are_told_with_their_most_frequent_reason_and_the_longest_run(
+    tmp_path: Path,
+) -> None:
+    grows = "still growing at 3.1 1/s (140 Hz); run at least {} s"
+    reasons = [grows.format("0.9"), "irregular", grows.format("1.54"), grows.format("1.2e-1")]
+    points = [{"regime": "undecided", "excitation": "none", "reason": each} for each in reasons]
+    said = swept(tmp_path, [*points, DAMPED]).findings.sentences[0]
+    assert said.startswith(f"4 of 5 points are undecided, 3 of them: {grows.format('1.54')}")
+    assert 'solver.duration = "settled"' in said
+    few = swept(tmp_path, [*points[:1], *[DAMPED] * 4]).findings.sentences
+    assert not any("points are undecided," in each for each in few)
