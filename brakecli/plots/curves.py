@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.table import Excitation
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.windows import Outcome
@@ -96,7 +96,8 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     """Amplitude or frequency; points have the colour of their regime, and are arrows if it was followed."""
-    axis, values, unit = picture.axes[0], picture[name], picture.units[name]
+    axis, unit, died = picture.axes[0], picture.units[name], picture.died(name)
+    values = np.where(died, np.nan, picture[name])  # what dies out has no place on a curve
     factor, unit = style.prefixed(style.largest(values), unit)
     lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
@@ -116,7 +117,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
             points: dict[str, Any] = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
             chosen = picture["regime"][number] == regime
             axes.plot(x[chosen], y[chosen], marker=arrow or marker, ms=size, **points)
-            if (picture["regime"] == regime).any():  # for the legend
+            if ((picture["regime"] == regime) & ~died).any():  # for the legend
                 axes.plot([], [], marker="s" if direction else marker, ms=7, label=str(regime), **points)
         waves = np.where(shaken[number], y, factor * forced[number])
         if (seen := np.isfinite(waves)).any():
@@ -143,7 +144,8 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         style.set_ticks(axes.yaxis, 0.5 * floor, 2.0 * highest)
     else:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
-    _mark(axes, x, [sweep.sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed()])
+    rest = sweep.sign(died, "damped: nothing lasts", ".", sweep.REGIMES[Regime.DAMPED][0], style.DARK)
+    _mark(axes, x, [sweep.sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed(), rest])
 
 
 def _crossings(x: style.Array, margin: style.Array) -> Iterator[float]:

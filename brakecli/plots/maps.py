@@ -22,6 +22,7 @@ _MOST_NAMED = 12  # attractors in the legend: the first of them
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
 _MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
+_EMPTY = "#F7F7F7"  # of cells without a value
 _ALIKE = 1e-6  # relative difference of numbers from which on they have different colours
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
@@ -85,7 +86,11 @@ def _amplitude_scale(picture: SweepPicture) -> Scale:
     least, largest, wide = picture.lasting_amplitudes()
     largest = largest or style.largest(picture["amplitude"])
     factor, unit = style.prefixed(largest, picture.units["amplitude"])
-    low, high, drawn = factor * least if wide else 0.0, factor * largest or 1.0, factor * picture["amplitude"]
+    low, high, drawn = (
+        factor * least if wide else 0.0,
+        factor * largest or 1.0,
+        factor * picture["amplitude"][~picture.died("amplitude")],
+    )
     beyond = int((drawn < low).any()) + 2 * int((drawn > 1.0001 * high).any())
     norm = LogNorm(low, high) if wide else Normalize(low, high)
     return Scale(f"amplitude ({unit})", norm, factor, ("neither", "min", "max", "both")[beyond])
@@ -93,7 +98,8 @@ def _amplitude_scale(picture: SweepPicture) -> Scale:
 
 def _scale(picture: SweepPicture, name: str) -> Scale:
     """Colours from the least to the greatest number; numbers that hardly differ have one colour."""
-    critical, values, unit = picture.critical, picture[name][np.isfinite(picture[name])], picture.units[name]
+    critical, unit, drawn = picture.critical, picture.units[name], np.isfinite(picture[name])
+    values = picture[name][drawn & ~picture.died(name)] if name == "frequency" else picture[name][drawn]
     words = name.replace("_", " ")
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
     if name == "critical" and critical is not None:
@@ -146,9 +152,12 @@ def _draw_attractors(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappa
 
 
 def _draw_numbers(axes: Axes, picture: SweepPicture, scale: Scale, name: str) -> ScalarMappable:
-    values = scale.factor * picture[name]
+    died = picture.died(name)
+    values = np.where(died, np.nan, scale.factor * picture[name])
+    if died.any():  # its cells are empty
+        axes.plot([], [], "s", ms=9, mfc=_EMPTY, mec=style.GREY, label="damped: nothing lasts")
     empty = {"marker": ".", "color": style.GREY, "label": "no value"}
-    nothing = np.isnan(values) & (picture["status"] == Status.DONE)
+    nothing = np.isnan(values) & ~died & (picture["status"] == Status.DONE)
     return _mesh(axes, picture, values, (nothing, empty), picture.failed(), cmap="viridis", norm=scale.norm)
 
 
@@ -180,7 +189,7 @@ def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, 
     x.apply_to(axes.xaxis)
     y.apply_to(axes.yaxis)
     axes.grid(False)
-    axes.set_facecolor("#F7F7F7")
+    axes.set_facecolor(_EMPTY)
     drawn = np.ma.masked_invalid(values[0].T)
     seams = {"edgecolors": "white", "linewidth": 0.4} if drawn.size <= 1000 else {"edgecolors": "face"}
     mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=drawn.size > _MOST_DRAWN)

@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.files import fields
@@ -71,6 +71,11 @@ class SweepPicture:
     def __getitem__(self, name: str) -> style.Array:
         """A variable."""
         return self.variables[name]
+
+    def died(self, name: str) -> style.Array:
+        """Where nothing lasts: amplitude and frequency there are those of a rest that dies out."""
+        dies = (self["regime"] == Regime.DAMPED) & (self["excitation"] == Excitation.NONE)
+        return dies if name in ("amplitude", "frequency") else np.zeros_like(dies)
 
     @property
     def summary(self) -> str:

@@ -82,3 +82,17 @@ def test_each_attractor_has_a_colour_of_its_own_in_grey_as_well(tmp_path: Path) 
     lines: list[Any] = attractor.get_lines()
     keys = [each.get_mfc()[:3] for each in lines if each.get_label()[:1].isdigit()]
     np.testing.assert_allclose(keys, cells)
+
+
+def test_a_cell_where_nothing_lasts_is_empty_however_large_its_amplitude_still_is(tmp_path: Path) -> None:
+    axes = (
+        axis("friction.coefficient", "values = [0.1, 0.2]"),
+        axis("shoe.mass", "values = [1.0, 2.0]"),
+    )
+    swept(tmp_path, [{**DAMPED, "amplitude": 3e-5}, CYCLE, CYCLE, CYCLE], *axes)
+    with open_result(tmp_path / "s.h5") as result, applied():
+        figure = draw(result)
+    mesh = figure.axes[1].collections[0]
+    values = np.ma.asarray(mesh.get_array()).reshape(2, 2)
+    assert np.ma.getmaskarray(values).tolist() == [[True, False], [False, False]]
+    assert "damped: nothing lasts" in [text.get_text() for text in figure.legends[0].get_texts()]

@@ -59,7 +59,10 @@ def test_a_computed_sweep_is_drawn_with_its_own_numbers(tmp_path: Path) -> None:
         amplitude = result.read("/", "amplitude")
     curve = np.array(figure.axes[0].get_lines()[0].get_xydata())
     np.testing.assert_array_equal(curve[:, 0], [0.3, 0.6, 0.9])  # in rising order
-    np.testing.assert_allclose(curve[:, 1], 1e6 * amplitude[[1, 2, 0]], rtol=1e-12)
+    np.testing.assert_allclose(curve[1:, 1], 1e6 * amplitude[[2, 0]], rtol=1e-12)
+    assert np.isnan(curve[0, 1])  # damped, and nothing forces it: no line leads there, and a mark says so
+    (mark,) = (line for line in figure.axes[0].get_lines() if line.get_label() == "damped: nothing lasts")
+    assert list(mark.get_xdata()) == [0.3]
     assert figure.axes[0].get_ylabel() == "amplitude (µm)"
     assert figure.axes[1].get_xlabel() == "friction.coefficient"
     assert figure.texts[0].get_text() == loaded.title
