@@ -45,7 +45,8 @@ def of_sweep(tree: xr.DataTree) -> xr.Dataset:
     """The points of a sweep; what they come to, a group of the file, is the attribute `attractors`, as JSON."""
     found = tree.to_dataset()
     if "attractors" in tree.children:
-        columns = {field.name: tree["attractors"][field.name].values.tolist() for field in fields.ATTRACTOR}
+        table = tree["attractors"].to_dataset()
+        columns = {field.name: table[field.name].values.tolist() for field in fields.ATTRACTOR}
         rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
         known = [{name: None if value != value else value for name, value in row.items()} for row in rows]  # NaN
         found.attrs["attractors"] = json.dumps(known)

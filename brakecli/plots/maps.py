@@ -84,7 +84,7 @@ def slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
 def _amplitude_scale(picture: SweepPicture) -> Scale:
     """Colours from 0 on, or logarithmic ones if amplitudes that last are of very different size."""
     least, largest, wide = picture.lasting_amplitudes()
-    largest = largest or style.largest(picture["amplitude"])
+    largest = largest or style.largest(picture["amplitude"][~picture.died("amplitude")])
     factor, unit = style.prefixed(largest, picture.units["amplitude"])
     low, high, drawn = (
         factor * least if wide else 0.0,

@@ -260,7 +260,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
 
 def _attractors(result: StoredResult) -> Iterator[str]:
     """Number, regime, frequency, amplitude and share of each attractor."""
-    names = ("regime", "frequency", "amplitude", "share")
+    names, rows = ("regime", "frequency", "amplitude", "share"), list[tuple[Any, ...]]()
     if isinstance(saved := result.attributes.get("attractors"), str):  # by xarray, without groups
         try:
             rows = [
