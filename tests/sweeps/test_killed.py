@@ -178,4 +178,4 @@ def test_workers_that_cannot_start_end_a_command_and_are_not_tried_for_each_poin
     )
     done = run(cwd=tmp_path, command=[sys.executable, "fails.py"])
     assert done.out.startswith("no worker starts: its process ended with exit code 1, 4 times; see above")
-    assert done.err.count("not in a worker") <= 6
+    assert done.err.count("AssertionError: not in a worker") <= 6  # four, and two that were started meanwhile
