@@ -14,6 +14,7 @@ import numpy as np
 import xarray as xr
 
 from brakecli.analysis.over_time import Vibration
+from brakecli.analysis.probability import Probability
 from brakecli.analysis.regime.bursts import Burst
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete
@@ -27,6 +28,7 @@ from brakecli.files.contents import Difference
 from brakecli.files.field import Field, values_of
 from brakecli.runs.advise import AdviceReport
 from brakecli.solver.steady_sliding import SteadySliding
+from brakecli.sweeps.attractors import Attractor
 
 _Record = TypeVar("_Record")
 _APART = {
@@ -141,6 +143,19 @@ class Accessor(Shown):
         columns = [held[each.name].values.tolist() for each in fields.VIBRATION]
         return tuple(Vibration(*map(_known, row)) for row in zip(*columns, strict=True))
 
+    @property
+    def attractors(self) -> tuple[Attractor, ...]:
+        """Of a sweep over initial states: each motion that its points come to, and their share."""
+        found = json.loads(self._found.attrs.get("attractors", "[]"))
+        if "attractors" in self._groups:
+            held = self._groups["attractors"].to_dataset()
+            columns = [held[each.name].values.tolist() for each in fields.ATTRACTOR]
+            names = [each.name for each in fields.ATTRACTOR]
+            found = [dict(zip(names, map(_known, row), strict=True)) for row in zip(*columns, strict=True)]
+        for each in found:
+            each["share"] = Probability(*map(each.pop, ("share", "share_lower", "share_upper")))
+        return tuple(Attractor(**each) for each in found)
+
     def table(self) -> str:
         """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, less evidence."""
         single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
@@ -154,6 +169,9 @@ class Accessor(Shown):
         rows: list[Row] = [(each.title, _cell(held[each.name], each)) for each in told]
         regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist() if "regime" in self._found else ())
         rows += [(name, f"at {count} of {regimes.total()}") for name, count in regimes.most_common()]
+        rows += [
+            (f"attractor {each.attractor}", f"{each.regime}, {each.share.value:.1%}") for each in self.attractors
+        ]
         rows += [("mode", f"{each.frequency:.5g} Hz, {each.growth:+.4g} 1/s") for each in self.modes]
         branches = [each for each in self._groups.values() if "kind" in each.attrs]
         rows += [(str(each.name), f"{each.attrs['kind']}, {each.sizes['point']} motions") for each in branches]

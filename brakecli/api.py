@@ -1,5 +1,6 @@
 """`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
+import json
 import multiprocessing
 import os
 import signal
@@ -261,7 +262,9 @@ def sweep(
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         from brakecli.cli.inputs import load_sweep
+        from brakecli.files import fields
         from brakecli.files.as_xarray import opened
+        from brakecli.files.field import values_of
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, counting, sweep
         from brakecli.sweeps.listed import GIVEN
@@ -290,7 +293,11 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
-        return opened(path, own=True).to_dataset()
+        result = opened(path, own=True).to_dataset()  # without groups
+        if report.findings.attractors is not None:
+            known = [values_of(fields.ATTRACTOR, each) for each in report.findings.attractors]
+            result.attrs["attractors"] = json.dumps(known)
+        return result
 
 
 def _axes(axes: Any, direction: Any) -> list[dict[str, Any]]:

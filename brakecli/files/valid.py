@@ -217,7 +217,7 @@ def attributes_of(node: h5py.HLObject, kind: str) -> dict[str, Any]:
     Raises ValueError for a declared one that is not what was declared.
     """
     name = "/branch_*" if fnmatchcase(str(node.name), "/branch_*") else str(node.name)
-    declared = [*_ATTRIBUTES.get((kind, name), ())]
+    declared = [each for each in _ATTRIBUTES.get((kind, name), ()) if each.in_file]
     given = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
     if node.name == "/":
         declared += [Field(name, "", "a text", fields.TEXT) for name in _TEXTS]

@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.files import fields
@@ -203,7 +203,7 @@ def gather(
         title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
     )
     if ATTRACTOR in known:
-        picture = replace(picture, attractors=tuple(_attractors(result)))
+        picture = replace(picture, attractors=tuple(_attractors(variables)))
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
         picture = replace(_selected(picture, wanted, result), findings=())
     for axis in picture.axes:
@@ -252,11 +252,16 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     return variables
 
 
-def _attractors(result: StoredResult) -> Iterator[str]:
-    """Number, regime, frequency, amplitude and share of each attractor."""
-    names = ("regime", "frequency", "amplitude", "share")
-    columns = (style.read_column(result, name, "attractors").tolist() for name in names)
-    for number, (regime, frequency, amplitude, share) in enumerate(zip(*columns, strict=True), start=1):
+def _attractors(variables: Mapping[str, style.Array]) -> Iterator[str]:
+    """Number, regime, frequency, amplitude and share of each attractor, by its points."""
+    numbers = variables[ATTRACTOR]
+    for number in range(1, int(np.nanmax(numbers, initial=0)) + 1):
+        here = numbers == number
+        regimes, counts = np.unique(variables["regime"][here], return_counts=True)
+        regime, share = str(regimes[counts.argmax()]), float(here.mean())
+        frequency, amplitude = (float(np.median(variables[name][here])) for name in ("frequency", "amplitude"))
+        if np.all(variables["excitation"][here] == Excitation.NONE):
+            amplitude = 0.0  # what dies comes to steady sliding
         factor, unit = style.prefixed(amplitude, "m")
         tone = f", {frequency:.4g} Hz" if np.isfinite(frequency) else ""
         size = f", {factor * amplitude:.3g} {unit}" if amplitude else ""

@@ -278,6 +278,7 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
     left = [each["squeal_probability"] for each in told["advice"]]
     assert left == sorted(left)
     assert max(left) < float(own)
+    assert told["check"]["parameter"] == told["advice"][0]["parameter"]
     for each in told["advice"]:
         settings = {each["parameter"]: float(f"{each['to']:.4g}")}
         if each["parameter"] == "link2.angle_deg":
