@@ -194,7 +194,7 @@ def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_n
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("friction.coefficient=0.3", "Nothing has to be changed; stable up to 0.575"),
+        ("friction.coefficient=0.3", "Nothing has to be changed; stable up to a friction coefficient of 0.575"),
         ("wheel.angular_speed=0.0", "No change is known; the wheel stands"),
     ],
 )
@@ -219,7 +219,9 @@ def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
         run(parse_case(TINY, "case", changes), tmp_path / f"{name}.h5", force=False)
     both = reported(tmp_path / "a.h5", tmp_path / "b.h5")
     beside = both.html[: both.html.index('<article id="part-1">')]
-    assert re.findall(r"<h2>(.: ..h5)</h2>", beside) == ["A: a.h5", "B: b.h5"]
+    apart = [f"friction.coefficient = {one}, shoe.mass = {two}\u00a0kg" for one, two in ((0.6, 10), (0.3, 12))]
+    assert re.findall(r"<h2>(.: .*)</h2>", beside) == [f"A: a.h5, {apart[0]}", f"B: b.h5, {apart[1]}"]
+    assert re.findall("<h1>(.*)</h1>", both.html)[1:] == [f"Tiny: {each}" for each in apart]
     assert beside.count("By theory: ") == 2
     assert beside.count("<figure>") == 1
     found = {cells[0]: (marked, cells[1:]) for marked, cells in rows(beside)}
@@ -253,6 +255,25 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
     assert (True, ["critical.lower", "0", "0.1", "differs"]) in rows(both)  # a key of the sweep, not of its case
     assert pictures("a", "b", "aa") == 0  # of more than two each is alone
     assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_what_the_program_has_chosen_is_no_change_of_the_user(given: bool, tmp_path: Path, plain: None) -> None:
+    """The interval of samples is a change where files give it; otherwise it is named apart, if its digits differ."""
+    text = BASE if given else BASE.replace("output.sample_interval = 1e-4", "")
+    for name, interval in (("a", 1e-4), ("b", 2e-4), ("c", 1e-4 + 1e-16)):
+        case = parse_case(BASE, "case", [f"output.sample_interval={interval!r}"])
+        about = {"title": "T", "resolved_toml": case.resolved, "case_toml": text}
+        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": CRITICAL}, **about)
+    changed, close = (reported(tmp_path / "a.h5", tmp_path / f"{name}.h5").html for name in "bc")
+    row = True, ["output.sample_interval", "100 µs", "200 µs", "+100 %"]
+    assert (row in rows(changed)) == given
+    told = "different, too: output.sample_interval (100\u00a0µs, 200\u00a0µs)."
+    assert (told in changed) != given
+    assert ("The cases are the same." in changed) != given
+    assert "different, too" not in close
+    heading = "T: output.sample_interval 100\u00a0µs → 200\u00a0µs" if given else "T: a.h5 – b.h5"
+    assert f"<h1>{heading}</h1>" in changed
 
 
 def test_branches_have_a_sentence_a_picture_and_their_special_points(
