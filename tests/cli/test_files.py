@@ -232,7 +232,7 @@ ERRORS = [
     (["a.h5", "-o", "a.wav", "--variable", "x", "--variable", "y"], "a sound is one variable"),
     (["a.h5", "-o", "a.wav", "--variable", "state"], "--variable state: a.h5 has none; give one of"),
     (["a.h5", "-o", "a.csv", "--variable", "time"], "--variable time: a.h5 has none"),
-    (["tiny.toml", "-o", "a.csv"], "this is not an HDF5 file"),
+    (["tiny.toml", "-o", "a.csv"], "this is no result yet; compute it first: brakecli run tiny.toml"),
     (["a.h5", "-o", "a.h5"], "its suffix does not name"),
 ]
 
