@@ -111,7 +111,7 @@ class AdviceReport:
         if critical == 0.0:
             yield "unstable at any friction, however small"
         elif critical is not None:
-            yield f"stable up to {critical:.3g}{_far(self.margin, own)}"
+            yield f"stable up to a friction coefficient of {critical:.3g}{_far(self.margin, own)}"
             if report.stable and critical < own:
                 changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
                 turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)

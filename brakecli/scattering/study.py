@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import Field
 from scipy import stats
 
@@ -200,6 +201,11 @@ class LoadedStudy:
     text: str
     base: LoadedCase
     name: str  # of its file
+
+    @property
+    def resolved(self) -> str:
+        """The study as TOML, with overrides and defaults filled in."""
+        return tomli_w.dumps(self.study.model_dump(mode="json", exclude_none=True))
 
     @property
     def title(self) -> str:
