@@ -52,7 +52,8 @@ def test_the_starter_can_vibrate_below_its_critical_friction(here: Path, found: 
     assert [mark["kind"] for mark in cycle["special"]] == ["flutter", "fold", "end"]
     fold = cycle["special"][1]
     assert found["coexists_from"] == fold["value"] < found["critical"]
-    assert "can exist beside stable sliding" in found["sentence"]
+    where = f"from {fold['value']:.4g} on a vibration at {fold['frequency']:.4g} Hz can exist beside stable sliding"
+    assert where in found["sentence"]
     assert found["critical_windows_lower"] == [found["critical"]]
     assert found["critical_windows_upper"] == [1.0]
 
