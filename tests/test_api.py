@@ -10,6 +10,7 @@ import threading
 import time
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -18,6 +19,7 @@ import pytest
 import xarray as xr
 
 import brakecli
+from brakecli.cli import output
 from brakecli.cli.output import telling
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from tests.commands import QUICK, ROOT, TINY
@@ -536,6 +538,19 @@ def test_progress_goes_to_a_function_and_to_standard_error(
             CASE, {"solver.duration": 20.0}, output=tmp_path / "r.h5", progress=lambda *_: told.remove(("", 0, 0))
         )
     assert not (tmp_path / "r.h5").exists()
+
+
+def test_what_a_line_has_counted_is_told_to_its_end(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At 25 s a line is due, the next one at 50 s; a short count within that time is not told."""
+    times = iter([0.0, 25.0, 30.0, 31.0, 31.0, 32.0, 33.0])
+    monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: next(times)))
+    with telling(quiet=False) as tell:
+        for done, total in ((1, 9), (8, 9), (9, 9), (9, 9), (1, 2), (2, 2)):
+            tell("points", done, total)
+    told = ["brakecli: points 1 of 9, 25 s", "brakecli: points 9 of 9, 31 s"]
+    assert capsys.readouterr().err.splitlines() == told
 
 
 def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
