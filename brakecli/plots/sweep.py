@@ -247,6 +247,8 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
+    dies = (variables["regime"] == Regime.DAMPED) & (variables["excitation"] == Excitation.NONE)
+    variables["amplitude"] = np.where(dies, 0.0, variables["amplitude"])  # what a short run leaves of it may be much
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
     variables["hysteresis"] = np.broadcast_to(differ, shape)
     return variables
@@ -260,8 +262,6 @@ def _attractors(variables: Mapping[str, style.Array]) -> Iterator[str]:
         regimes, counts = np.unique(variables["regime"][here], return_counts=True)
         regime, share = str(regimes[counts.argmax()]), float(here.mean())
         frequency, amplitude = (float(np.median(variables[name][here])) for name in ("frequency", "amplitude"))
-        if np.all(variables["excitation"][here] == Excitation.NONE):
-            amplitude = 0.0  # what dies comes to steady sliding
         factor, unit = style.prefixed(amplitude, "m")
         tone = f", {frequency:.4g} Hz" if np.isfinite(frequency) else ""
         size = f", {factor * amplitude:.3g} {unit}" if amplitude else ""
