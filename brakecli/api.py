@@ -415,6 +415,7 @@ def advise(
                 from brakecli.scattering.scatter import engine_for
 
                 report = under_scatter(report, loaded, study, partial(engine_for, in_caller=True), tell)
+                _warn(study.beside(loaded.case))
         return Advice(**vars(report))
 
 

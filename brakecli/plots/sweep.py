@@ -248,7 +248,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
     dies = (variables["regime"] == Regime.DAMPED) & (variables["excitation"] == Excitation.NONE)
-    variables["amplitude"] = np.where(dies, 0.0, variables["amplitude"])  # what a short run leaves of it may be much
+    variables["amplitude"] = np.where(dies, 0.0, variables["amplitude"])  # a short run may leave much of it
     differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
     variables["hysteresis"] = np.broadcast_to(differ, shape)
     return variables

@@ -240,7 +240,7 @@ def _report(
         indices=index,
         columns={**kept, "squeal": squealing.astype(np.int64)},
         values=drawing.values,
-        notes=_notes(study, count, index),
+        notes=[*loaded.beside(loaded.base.case), *_notes(study, count, index)],
     )
 
 
