@@ -199,7 +199,11 @@ def _study(result: StoredResult) -> tuple[str, list[Table]]:
         for each in study.parameter
     ]
     asked = [
-        (name, shown(getattr(study, name), "Hz" if name == "band" else ""), _meaning_in_study(name))
+        (
+            name,
+            shown(getattr(study, name), "Hz" if name == "band" else ""),
+            str(Study.model_fields[name].description),
+        )
         for name in ("samples", "seed", "sampling", "method", "band", "indices_of", "correlation")
         if getattr(study, name) is not None
     ]
@@ -207,10 +211,6 @@ def _study(result: StoredResult) -> tuple[str, list[Table]]:
     scatter = f"{', '.join(study.names)} {'scatters' if len(study.names) == 1 else 'scatter'}"
     said = f"Such brakes are those of the case in which {scatter}; squeal is a vibration of their own{band}."
     return said, [Table(laws, ("what scatters", "distribution", "its numbers")), Table(asked)]
-
-
-def _meaning_in_study(name: str) -> str:
-    return str(Study.model_fields[name].description or "")
 
 
 def _unit_of_key(result: StoredResult) -> str:

@@ -181,7 +181,17 @@ def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
     assert len(helpful) > of_run.MOST_CHANGES
     names = [each.parameter for each in helpful[: of_run.MOST_CHANGES]]
     assert [cells[0] for _, cells in rows(first)] == ["what to change", *names]
+    change, (_, cells) = helpful[0], rows(first)[1]
+    part = f"{100.0 * (float(change.rounded) / change.start - 1.0):+.3g} %".replace("-", "−")
+    assert cells[2].endswith(f"({part})")
     assert {each.parameter for each in report.advice} <= {cells[0] for _, cells in rows(appendix)}
+
+
+def test_keys_keep_their_spelling_and_lengths_have_a_prefix() -> None:
+    lines = ["solver.duration: settled after 0.1 s", "the pad opens"]
+    assert of_run._sentences("", lines) == ["solver.duration: settled after 0.1 s.", "The pad opens."]
+    found = {"reasons": ["it comes to an amplitude of 8.71e-05 m at 0.05 m/s"]}
+    assert of_run._reasons(found) == ["it comes to an amplitude of 87.1\u00a0µm at 0.05 m/s"]
 
 
 def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_not_see_it(found: Page) -> None:
