@@ -20,10 +20,10 @@ from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete
 from brakecli.cli.file_tables import diff_table
 from brakecli.cli.stability_tables import advice_table
-from brakecli.cli.tables import Row, attractors_table, text_of, two_columns, verdict_table
+from brakecli.cli.tables import Row, text_of, two_columns, verdict_table
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
-from brakecli.files.as_xarray import of_sweep, stored
+from brakecli.files.as_xarray import stored
 from brakecli.files.contents import Difference
 from brakecli.files.field import Field, values_of
 from brakecli.runs.advise import AdviceReport
@@ -32,7 +32,6 @@ from brakecli.sweeps.attractors import Attractor
 
 _Record = TypeVar("_Record")
 _APART = {
-    "attractors",
     "modes",
     "crossings",
     "equilibrium",
@@ -146,11 +145,16 @@ class Accessor(Shown):
 
     @property
     def attractors(self) -> tuple[Attractor, ...]:
-        """Of a sweep over initial states: regime, amplitude (m), frequency (Hz), share of each attractor."""
-        found = of_sweep(self._found) if isinstance(self._found, xr.DataTree) else self._found
-        given = json.loads(found.attrs.get("attractors", "[]"))
-        parts = ("share", "share_lower", "share_upper")
-        return tuple(Attractor(share=Probability(*map(one.pop, parts)), **one) for one in given)
+        """Of a sweep over initial states: each motion that its points come to, and their share."""
+        found = json.loads(self._found.attrs.get("attractors", "[]"))
+        if "attractors" in self._groups:
+            held = self._groups["attractors"].to_dataset()
+            columns = [held[each.name].values.tolist() for each in fields.ATTRACTOR]
+            names = [each.name for each in fields.ATTRACTOR]
+            found = [dict(zip(names, map(_known, row), strict=True)) for row in zip(*columns, strict=True)]
+        for each in found:
+            each["share"] = Probability(*map(each.pop, ("share", "share_lower", "share_upper")))
+        return tuple(Attractor(**each) for each in found)
 
     def table(self) -> str:
         """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, less evidence."""
@@ -165,12 +169,13 @@ class Accessor(Shown):
         rows: list[Row] = [(each.title, _cell(held[each.name], each)) for each in told]
         regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist() if "regime" in self._found else ())
         rows += [(name, f"at {count} of {regimes.total()}") for name, count in regimes.most_common()]
+        rows += [
+            (f"attractor {each.attractor}", f"{each.regime}, {each.share.value:.1%}") for each in self.attractors
+        ]
         rows += [("mode", f"{each.frequency:.5g} Hz, {each.growth:+.4g} 1/s") for each in self.modes]
         branches = [each for each in self._groups.values() if "kind" in each.attrs]
         rows += [(str(each.name), f"{each.attrs['kind']}, {each.sizes['point']} motions") for each in branches]
-        notes = ("note", [*self._texts("notes"), *self.warnings])
-        listed = [attractors_table(self.attractors)] if self.attractors else []
-        return "\n\n".join([*listed, two_columns(title, [*rows, notes])])
+        return two_columns(title, [*rows, ("note", [*self._texts("notes"), *self.warnings])])
 
     def _repr_png_(self) -> bytes | None:
         from brakecli.plots.result import plot_result

@@ -1,5 +1,6 @@
 """`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
 
+import json
 import multiprocessing
 import os
 import signal
@@ -242,6 +243,7 @@ def sweep(
         source: path of a sweep file, or what `load` gave; with `axes`, `points` or `critical` a case.
         settings: keys of the base case to change.
         axes: values of each key, as `{"friction.coefficient": [0.3, 0.5]}`; a tuple of keys takes the same values.
+            A range is written as in a file: `{"friction.coefficient": {"start": 0.1, "stop": 0.5, "num": 5}}`.
         points: points in place of a grid: the values of each key at all of them, as `{"shoe.mass": [10.0, 12.0],
             "friction.coefficient": [0.3, 0.5]}` or as a data frame; the dataset has the dimension `point`.
         critical: the keys of `[critical]`, as `{"parameter": "friction.coefficient", "lower": 0, "upper": 2}`.
@@ -261,7 +263,9 @@ def sweep(
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         from brakecli.cli.inputs import load_sweep
-        from brakecli.files.as_xarray import of_sweep, opened
+        from brakecli.files import fields
+        from brakecli.files.as_xarray import opened
+        from brakecli.files.field import values_of
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, counting, sweep
         from brakecli.sweeps.listed import GIVEN
@@ -290,7 +294,11 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             _warn([f"{failed}, the first: {found[0]['reason']}"])
-        return of_sweep(opened(path, own=True))
+        result = opened(path, own=True).to_dataset()  # without groups
+        if report.findings.attractors is not None:
+            known = [values_of(fields.ATTRACTOR, each) for each in report.findings.attractors]
+            result.attrs["attractors"] = json.dumps(known)
+        return result
 
 
 def _axes(axes: Any, direction: Any) -> list[dict[str, Any]]:
@@ -300,8 +308,12 @@ def _axes(axes: Any, direction: Any) -> list[dict[str, Any]]:
     ways = _mapping(ways, "direction")
     if unknown := [key for key in ways if key not in given]:
         raise UsageError(f"direction: {unknown[0]!r} is not among the axes; name an axis as axes does")
-    axis = {key: {"parameter": key, "values": values} for key, values in given.items()}
-    return [axis[key] | ({"direction": ways[key]} if key in ways else {}) for key in given]
+    return [
+        {"parameter": key}
+        | dict(each if isinstance(each, Mapping) else {"values": each})
+        | ({"direction": ways[key]} if key in ways else {})
+        for key, each in given.items()
+    ]
 
 
 def _scheduler(given: Any) -> Any:
@@ -403,6 +415,7 @@ def advise(
                 from brakecli.scattering.scatter import engine_for
 
                 report = under_scatter(report, loaded, study, partial(engine_for, in_caller=True), tell)
+                _warn(study.beside(loaded.case))
         return Advice(**vars(report))
 
 
@@ -770,6 +783,9 @@ def _plain(value: Any, key: str) -> Any:
             return given(value)
         except UnreadableResultError as error:
             raise UsageError(f"{key}: {error}") from error
+    if isinstance(value, Mapping) and hasattr(value, "attrs"):  # a dataset, or a tree of them
+        what = "is a result in memory; give output to the function that computes it, and name that file"
+        raise UsageError(f"{key}: {what}")
     value = value.to_numpy() if hasattr(value, "to_numpy") else value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):

@@ -102,6 +102,7 @@ def _for_python(text: str) -> str:
         return _ARGUMENTS.get(option[0], option[0].strip("-").replace("-", "_"))
 
     text = re.sub(r"""with: brakecli (\w+) (?:'[^']*'|"[^"]*"|[^\s'"])+""", r"with: brakecli.\1", text)
+    text = text.replace('"/numpy/array ', '"array ')
     return re.sub(r"(?<!\S)(-o|--[a-z][a-z-]*)\b", argument, text)
 
 
@@ -112,7 +113,12 @@ def in_python() -> Iterator[None]:
         yield
     except CaseError as error:
         problems = [
-            replace(each, source=_for_python(each.source), remedy=_for_python(each.remedy))
+            replace(
+                each,
+                source=_for_python(each.source),
+                what=_for_python(each.what),
+                remedy=_for_python(each.remedy),
+            )
             for each in error.problems
         ]
         raise CaseError(problems) from error

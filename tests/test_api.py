@@ -10,6 +10,7 @@ import threading
 import time
 from fractions import Fraction
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -18,7 +19,7 @@ import pytest
 import xarray as xr
 
 import brakecli
-from brakecli.case.read import starters
+from brakecli.cli import output
 from brakecli.cli.output import telling
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from tests.commands import QUICK, ROOT, TINY
@@ -539,6 +540,19 @@ def test_progress_goes_to_a_function_and_to_standard_error(
     assert not (tmp_path / "r.h5").exists()
 
 
+def test_what_a_line_has_counted_is_told_to_its_end(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """At 25 s a line is due, the next one at 50 s; a short count within that time is not told."""
+    times = iter([0.0, 25.0, 30.0, 31.0, 31.0, 32.0, 33.0])
+    monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: next(times)))
+    with telling(quiet=False) as tell:
+        for done, total in ((1, 9), (8, 9), (9, 9), (9, 9), (1, 2), (2, 2)):
+            tell("points", done, total)
+    told = ["brakecli: points 1 of 9, 25 s", "brakecli: points 9 of 9, 31 s"]
+    assert capsys.readouterr().err.splitlines() == told
+
+
 def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
     places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
     heights = 1e-6 * np.sin(2.0 * places) + 3e-7 * np.sin(6.0 * places)
@@ -548,7 +562,7 @@ def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
     columns = np.column_stack([places, heights])
     given: list[Any] = [
         {"roughness.wheel.profile": columns},
-        {"roughness.wheel": {"profile": (places, heights)}},
+        {"roughness.wheel": {"profile": columns.tolist()}},
         {"roughness": {"wheel": {"profile": xr.DataArray(columns[::-1])}}},
     ]
     for settings in given:
@@ -570,15 +584,48 @@ def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
     sweep = brakecli.sweep(loaded, axes=radii, jobs=1)
     assert sweep.amplitude[0] == found.attrs["amplitude"]
     for wrong, words in (
-        (np.zeros(5), "is no profile"),
-        (np.zeros((5, 3)), "is no profile"),
+        (np.zeros(5), r"is an array of shape \(5,\)"),
+        (np.zeros((5, 3)), r"is an array of shape \(5, 3\)"),
+        (columns.T, r"is an array of shape \(2, 180\); give places and heights \(m\), as two columns"),
         (np.zeros((2, 2)), "has 2 rows"),
-        (["a", "b"], "is no profile"),
+        (["a", "b"], "is no array of numbers"),
+        (columns.astype(str), "is no array of numbers"),
+        ([[0.0, 1.0], [2.0]], "is no array of numbers"),
         (np.ma.masked_less(columns, 1e-7), "a cell is empty"),
         (columns * [1.0, 0.0], "all heights are equal"),
     ):
         with pytest.raises(UsageError, match=rf"^roughness\.wheel\.profile: {words}"):
             brakecli.run(tmp_path / "c.toml", {"roughness.wheel.profile": wrong})
+
+
+def test_an_array_is_called_so_where_it_does_not_fit() -> None:
+    flat = np.repeat(np.linspace(0.0, 1e-3, 99), 2).reshape(-1, 2)  # heights on a straight line
+    with pytest.raises(CaseError, match="straight line") as caught:
+        brakecli.load(CASE, {"roughness.wheel.profile": flat})
+    assert '(found "array ' in str(caught.value)
+    assert "/numpy" not in str(caught.value)
+
+
+def test_an_axis_may_be_a_range_and_is_named_where_it_is_wrong(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+
+    def sweep(axis: Any) -> xr.Dataset:
+        return brakecli.sweep(tmp_path / "c.toml", axes={"friction.coefficient": axis}, jobs=1)
+
+    found = sweep({"start": 0.1, "stop": 0.4, "num": 3, "spacing": "log"})
+    np.testing.assert_array_equal(found.friction_coefficient, [0.1, 0.2, 0.4])
+    for wrong, words in (({"start": 0.1, "stop": 0.4}, "num: is missing"), (0.1, "values: is not a list")):
+        with pytest.raises(CaseError, match=rf"^the sweep: axis\[0\]\.{words}"):
+            sweep(wrong)
+
+
+def test_a_result_in_memory_is_no_start_of_a_run(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+    tree = brakecli.run(tmp_path / "c.toml", output=tmp_path / "before.h5")
+    for settings in ({"initial.from": tree}, {"initial": {"from": tree["history"].to_dataset()}}):
+        with pytest.raises(UsageError, match=r"^initial\.from: is a result in memory; give output to"):
+            brakecli.run(tmp_path / "c.toml", settings)
+    brakecli.run(tmp_path / "c.toml", {"initial.from": tmp_path / "before.h5"})
 
 
 def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
@@ -610,28 +657,3 @@ def test_what_comes_from_a_damaged_file_stays_marked(tmp_path: Path) -> None:
     for drawn, marked in ((tree, True), (brakecli.run(CASE, SHORT), False)):
         texts = [text.get_text() for text in brakecli.plot(drawn).texts]
         assert ("read by force: a digest does not fit" in texts) is marked
-
-
-@pytest.mark.filterwarnings("ignore:.*digest")
-@pytest.mark.usefixtures("compiled")
-def test_attractors_of_a_sweep_in_memory_are_drawn_reported_saved_and_read_as_records(tmp_path: Path) -> None:
-    (tmp_path / "branch.toml").write_text(starters()["branch"])
-    axes = {"initial.vy": [0.0, 3e-3]}
-    found = brakecli.sweep(
-        tmp_path / "branch.toml", {"solver.duration": 5.0}, axes=axes, output=tmp_path / "a.h5", jobs=1
-    )
-    with xr.open_dataset(tmp_path / "a.h5", engine="h5netcdf", group="attractors") as table:
-        shares, amplitudes = table.share.values.tolist(), table.amplitude.values.tolist()
-    assert shares
-    found.to_netcdf(tmp_path / "saved.h5", engine="h5netcdf")
-    of_file, saved = brakecli.load(tmp_path / "a.h5"), brakecli.load(tmp_path / "saved.h5")
-    for each in (found, of_file, saved):
-        assert [one.share.value for one in each.brakecli.attractors] == shares
-        assert [one.amplitude for one in each.brakecli.attractors] == amplitudes
-        assert "95 % interval" in repr(each.brakecli)
-        words = f"{shares[0]:.1%} of the points"
-        assert brakecli.plot(each).axes
-        assert words in brakecli.report(each)
-    found.attrs["attractors"] = "[1]"
-    with pytest.raises(UnreadableResultError, match="is not a list of attractors"):
-        brakecli.plot(found)

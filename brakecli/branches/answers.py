@@ -206,12 +206,13 @@ class Answers:
             places = [*group]
             ends = [self._bound(followed, places[0], -1), self._bound(followed, places[-1], 1)]
             part = [points[k] for k in places]
-            slowest = min(part, key=lambda point: point.p)
             low, high = (
                 min([*ends, *self._turns(followed, places, way)], key=lambda bound: way * bound.p)
                 for way in (1, -1)
             )
-            found.append(Part(low, high, slowest.facts.frequency))
+            special = [each.point for each in branch.specials if each.p == low.p] if branch else []
+            lowest = special[0] if special else min(part, key=lambda point: point.p)
+            found.append(Part(low, high, lowest.facts.frequency))
         return found
 
     def _turns(self, followed: Followed, places: list[int], way: int) -> list[Bound]:

@@ -92,16 +92,18 @@ def read(path: Path) -> Record:
 
 
 def given(value: object) -> str:
-    """The name, among the `arrays`, of a profile: an array of places and heights (m), two columns or two rows.
+    """The name, among the `arrays`, of a profile: an array of places and heights (m), as two columns.
 
     Raises UnreadableResultError.
     """
     try:
-        rows = np.ma.array(value, np.float64).filled(np.nan)
+        rows: Any = np.ma.array(value)
     except (TypeError, ValueError):
-        rows = np.empty(0)
-    rows = rows.T if rows.shape[:1] == (2,) and rows.shape != (2, 2) else rows
-    require(rows.ndim == 2 and rows.shape[1] == 2, "is no profile; give places and heights (m), as two columns")
+        rows = np.ma.array("lists of different lengths")
+    columns = "; give places and heights (m), as two columns"
+    require(rows.dtype.kind in "fiu", f"is no array of numbers{columns}")
+    require(rows.shape[1:] == (2,), f"is an array of shape {rows.shape}{columns}")
+    rows = rows.astype(np.float64).filled(np.nan)
     require(rows.nbytes <= MOST_MEASURED, f"takes more than {MOST_MEASURED / 1e6:g} MB; measure fewer places")
     record = _checked(rows[:, 0], rows[:, 1], is_angle=False)
     digest = hashlib.sha256(record.place + record.height).hexdigest()

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from brakecli.cli.inputs import load_case, load_study
 from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
-from brakecli.cli.output import progress, say, show_result
+from brakecli.cli.output import progress, say, show_result, warn
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
 STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study; its case is not used."
@@ -41,4 +41,5 @@ def command(
             from brakecli.scattering.scatter import engine_for
 
             report = under_scatter(report, loaded, study, engine_for, show_progress)
+            warn(*study.beside(loaded.case))
     show_result("advise", report.numbers(), advice_table, report, as_json=as_json, quiet=quiet)

@@ -1,5 +1,6 @@
 """`brakecli new`."""
 
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
@@ -7,8 +8,8 @@ import typer
 
 from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import Force, Quiet, option, output_option
-from brakecli.cli.output import show
-from brakecli.errors import UsageError
+from brakecli.cli.output import say, show
+from brakecli.errors import UsageError, printable
 from brakecli.files.os_signals import unwinding
 
 NAME = "Name of the file, with or without .toml; that of a starter gives this one, others the starter of a case."
@@ -34,7 +35,8 @@ def command(
     if not name:
         raise UsageError("the name is empty; give one, or leave it out for case.toml")
     path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
-    text = texts.get(name.removesuffix(".toml"), texts["case"])
+    starter = name.removesuffix(".toml")
+    text, near = texts.get(starter, texts["case"]), get_close_matches(starter, texts, n=1, cutoff=0.7)
     written, base = {path: text}, text.partition('\ncase = "')[2].partition('"')[0]  # a sweep or a study has one
     if base and not (path.parent / base).exists():
         written[path.parent / base] = texts[base.removesuffix(".toml")]
@@ -48,3 +50,5 @@ def command(
         verb = "scatter" if text == texts["scatter"] else "sweep" if base else "run"
         how = shown if follows else f"brakecli {verb} {as_argument(path)}"
         show(f"{' and '.join(map(str, written))}: written; run it with: {how}")
+        if near and starter not in texts:
+            say(f"no starter is called {printable(starter)}, so this is that of a case; did you mean {near[0]}?")

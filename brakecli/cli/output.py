@@ -71,13 +71,18 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
 
 @contextmanager
 def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield such a function: a bar; without a terminal lines, after some seconds and then ever less often."""
+    """Yield such a function: a bar; without a terminal lines, after some seconds and then ever less often.
+
+    What a line has said of is also said when it is complete.
+    """
     if quiet or sys.stderr is None or not sys.stderr.isatty():
-        start, due = time.monotonic(), first_line
+        start, due, open_total = time.monotonic(), first_line, 0
 
         def tell(what: str, done: int, total: int) -> None:
-            nonlocal due
-            if not quiet and (passed := time.monotonic() - start) >= due:
+            nonlocal due, open_total
+            ends = 0 < done == total == open_total
+            if not quiet and ((passed := time.monotonic() - start) >= due or ends):
+                open_total = total if done < total else 0
                 due = passed + min(passed, LAST_LINES)
                 say(f"{what} {done} of {total}, {passed:.0f} s" if total else f"{what}, {passed:.0f} s")
 

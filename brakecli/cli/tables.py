@@ -206,11 +206,11 @@ def sweep_table(report: SweepReport) -> str:
         ("file", str(report.output)),
     ]
     listed = [_points_table(report)] if found.points <= MOST_LISTED_POINTS else []
-    listed += [attractors_table(found.attractors)] if found.attractors else []
+    listed += [_attractors_table(found.attractors)] if found.attractors else []
     return "\n\n".join([*listed, two_columns(report.loaded.title, rows)])
 
 
-def attractors_table(found: Iterable[Attractor]) -> str:
+def _attractors_table(found: Iterable[Attractor]) -> str:
     """What the points of a sweep over initial states come to."""
     each = [values_of(fields.ATTRACTOR, one) for one in found]
     return grid(

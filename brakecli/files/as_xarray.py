@@ -11,7 +11,7 @@ import h5py
 import xarray as xr
 
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files import fields, valid
+from brakecli.files import valid
 from brakecli.files.field import Field
 from brakecli.files.read import StoredResult, open_result
 from brakecli.files.trust import MISSING, readings
@@ -39,18 +39,6 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
         reason = repr(error) if isinstance(error, LookupError) else error
         what = f"{path}: xarray cannot read what it holds: {reason}"
         raise UnreadableResultError(f"{what}; compute the result again") from error
-
-
-def of_sweep(tree: xr.DataTree) -> xr.Dataset:
-    """The points of a sweep; what they come to, a group of the file, is the attribute `attractors`, as JSON."""
-    found = tree.to_dataset()
-    if "attractors" in tree.children:
-        table = tree["attractors"].to_dataset()
-        columns = {field.name: table[field.name].values.tolist() for field in fields.ATTRACTOR}
-        rows = [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)]
-        known = [{name: None if value != value else value for name, value in row.items()} for row in rows]  # NaN
-        found.attrs["attractors"] = json.dumps(known)
-    return found
 
 
 @contextmanager

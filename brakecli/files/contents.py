@@ -2,7 +2,7 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,11 +15,12 @@ from brakecli.files.read import StoredResult, Variable
 from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
 
-_CASES = ("resolved_toml", "resolved_sweep_toml")
+_CASES = ("resolved_toml", "resolved_sweep_toml", "resolved_study_toml")
 _APART = {
     "_NCProperties",
     "case_toml",
     "sweep_toml",
+    "study_toml",
     *_CASES,
     "title",
     "kind",
@@ -96,10 +97,10 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program)
 
 
-def keys(result: StoredResult) -> dict[str, Any]:
-    """All keys of the case and of the sweep with their values; raises UnreadableResultError."""
+def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, Any]:
+    """All keys of the case, and of the sweep or the study, with their values; raises UnreadableResultError."""
     found: dict[str, Any] = {}
-    for name in _CASES:
+    for name in texts:
         try:
             found |= flat(parse(str(result.attributes.get(name, "")), name, number=_finite))
         except (CaseError, ValueError, RecursionError) as error:

@@ -11,6 +11,7 @@ Damage that a digest was made to fit ends or blocks HDF5 itself. So another proc
 import hashlib
 import os
 import resource
+import shlex
 import signal
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -258,4 +259,10 @@ def _explained(path: Path) -> Iterator[None]:
     except Exception as error:
         reason = getattr(error, "strerror", None) or str(error)
         what = f"{path}: cannot be read as a result: {' '.join(reason.split())}"
-        raise UnreadableResultError(f"{what}; name an intact result file, or compute it again") from error
+        remedy = "name an intact result file, or compute it again"
+        if path.suffix == ".toml" and not isinstance(error, OSError):
+            what, remedy = (
+                f"{path}: this is no result yet",
+                f"compute it first: brakecli run {shlex.quote(str(path))}",
+            )
+        raise UnreadableResultError(f"{what}; {remedy}") from error

@@ -217,7 +217,7 @@ def attributes_of(node: h5py.HLObject, kind: str) -> dict[str, Any]:
     Raises ValueError for a declared one that is not what was declared.
     """
     name = "/branch_*" if fnmatchcase(str(node.name), "/branch_*") else str(node.name)
-    declared = [*_ATTRIBUTES.get((kind, name), ())]
+    declared = [each for each in _ATTRIBUTES.get((kind, name), ()) if each.in_file]
     given = {name: plain_attribute(node, name) for name in node.attrs if name not in _MACHINERY}
     if node.name == "/":
         declared += [Field(name, "", "a text", fields.TEXT) for name in _TEXTS]
@@ -284,8 +284,6 @@ def _fits(field: Field, value: Any) -> bool:
     whole = isinstance(value, int)
     if field.kind[0] == "f":
         return (whole or isinstance(value, float)) and abs(value) <= LARGEST_IN_HISTORY
-    if field.rows and isinstance(value, str):  # of a dataset that xarray has saved: JSON
-        return True
     if field.kind[0] == "i" or field.rows:
         return whole
     if field.kind != fields.OBJECT:

@@ -39,9 +39,14 @@ def draw(result: StoredResult) -> Figure:
     for group in groups:
         names = ("value", "amplitude", "frequency", "stable")
         columns = {name: np.asarray(result.read(group, name), float) for name in names}
+        kind = str(result.group_attributes(group).get("kind", ""))
+        if kind == _SLIDING and len(columns["value"]):
+            cut = _other_mode(columns["frequency"], np.asarray(result.read(group, "multipliers"), float))
+            columns = {name: np.insert(each, cut, each[cut]) for name, each in columns.items()}
+            columns["frequency"][cut + np.arange(len(cut))] = np.nan
         inner = f"{group}/special"
         marks = {name: result.read(inner, name) for name in ("kind", "value", "amplitude", "frequency")}
-        branches.append((str(result.group_attributes(group).get("kind", "")), columns, marks))
+        branches.append((kind, columns, marks))
     if not groups or not any(len(columns["value"]) for _, columns, _ in branches):
         raise UsageError(f"{result.path}: holds no motion, so there is nothing to draw")
     units = style.unit_of(result.variables(groups[0])["value"].attributes)
@@ -54,10 +59,13 @@ def draw(result: StoredResult) -> Figure:
     shown = set[str]()
     for number, (kind, columns, marks) in enumerate(branches):
         colour = style.DARK if kind == _SLIDING else _COLOURS[(number - 1) % len(_COLOURS)]
+        upper.plot([], [], color=colour, lw=1.8, label=kind)
         for axes, name in ((upper, "amplitude"), (lower, "frequency")):
             if not (wide and name == "amplitude" and kind == _SLIDING):
-                _line(axes, columns, name, colour, kind if axes is upper else "")
+                _line(axes, columns, name, colour)
             _marks(axes, marks, name, colour, shown if axes is upper else None, wide and kind == _SLIDING)
+    if not all(columns["stable"].all() for _, columns, _ in branches):
+        upper.plot([], [], color=style.GREY, lw=1.2, ls=style.DASHES, label="unstable")
     if wide:
         upper.set_yscale("log")
     for name, text in (("critical", "squeals by itself"), ("coexists_from", "can vibrate")):
@@ -82,15 +90,25 @@ def _number(group: str) -> int:
     return int(digits) if digits.isdigit() else 0
 
 
-def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str, label: str) -> None:
+def _other_mode(frequency: style.Array, multipliers: style.Array) -> style.Array:
+    """The places of steady sliding at which another mode is the least stable one than at the place before.
+
+    Multipliers are those of a period of the least stable mode, so that their angles say how far the other one is.
+    """
+    angles = np.abs(np.arctan2(multipliers[..., 1], multipliers[..., 0])).max(axis=1) / (2.0 * np.pi)
+    before, after, apart = frequency[:-1], frequency[1:], (angles * frequency)[:-1]
+    other = np.minimum(np.abs(after - before - apart), np.abs(after - before + apart))
+    return 1 + np.flatnonzero(other < np.abs(after - before))
+
+
+def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str) -> None:
     """One quantity of a branch: stable parts full, unstable ones dashed, which begin where the other part ends."""
     places = range(len(columns["value"]))
     for stable, part in groupby(places, lambda place: bool(columns["stable"][place])):
         inside = list(part)
         inside = [max(inside[0] - 1, 0), *inside] if not stable else [*inside, min(inside[-1] + 1, places[-1])]
         look: dict[str, Any] = {"ls": "-", "lw": 1.8} if stable else {"ls": style.DASHES, "lw": 1.2}
-        axes.plot(columns["value"][inside], columns[name][inside], color=colour, label=label or None, **look)
-        label = ""
+        axes.plot(columns["value"][inside], columns[name][inside], color=colour, **look)
 
 
 def _marks(

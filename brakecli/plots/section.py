@@ -12,9 +12,9 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import scaled
 from brakecli.plots.run import BLOCK, case_of
+from brakecli.solver.period import common_period
 
-MOST = 20_000  # points that are drawn, the last ones
-_BEHIND = 20_000  # samples of the motion that are drawn behind them, the last ones
+MOST = 200_000  # samples whose time is drawn, the last ones
 WAVE, KINDS = "wave", ("stick", "slip", "turn", "lift-off", "touch")
 _WITH_THE_WHEEL = KINDS[:3]  # where vx is the wheel's speed
 _FEWEST = 8  # samples in a period between which a state is certain
@@ -30,7 +30,9 @@ def draw(result: StoredResult, section: str) -> Figure:
         raise style.unreadable(result, "its history has no times and states of equal length above 1")
     start, end = (float(result.read("history", "time", at, at + 1)[0]) for at in (0, samples - 1))
     time = start, end, (end - start) / (samples - 1)
-    begin = min(max(float(result.attributes.get("settled_from") or 0.0), start), end)
+    settled = min(max(float(result.attributes.get("settled_from") or 0.0), start), end)
+    first = max(min(round((settled - start) / time[2]), samples - 2), samples - MOST)
+    begin = max(settled, start + first * time[2])
     if section == WAVE:
         points, where = _at_waves(result, time, begin)
     elif section in KINDS:
@@ -38,7 +40,6 @@ def draw(result: StoredResult, section: str) -> Figure:
     else:
         known = ", ".join((WAVE, *KINDS))
         raise UsageError(f"--section {section}: there is no such section; give one of {known}")
-    first = max(min(round((begin - start) / time[2]), samples - 2), samples - _BEHIND)
     last = {name: result.read("history", name, first) for name in _STATE}
     count = f"{len(points['x'])} points from {begin:.4g} s on"
     title = case_of(result).case.title or "Case without a title"
@@ -49,7 +50,7 @@ def draw(result: StoredResult, section: str) -> Figure:
         motion, dots = (
             [look(found[name]) for name, look in zip(pair, looks, strict=True)] for found in (last, points)
         )
-        axes.plot(*motion, color=style.GREY, lw=0.4, label="motion")
+        axes.plot(*motion, color=style.GREY, lw=0.4, label="motion", rasterized=True)
         axes.plot(*dots, color=style.BLUE, ls="none", marker=".", label="section")
         axes.set(xlabel=looks[0].label, ylabel=looks[1].label, xlim=looks[0].limits, ylim=looks[1].limits)
     return figure
@@ -73,7 +74,7 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
         raise UsageError(
             f"--section {WAVE}: {what}; run with output.sample_interval={1.0 / frequency / _FEWEST:.2g}"
         )
-    times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1)[-MOST:] / frequency
+    times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1) / frequency
     if not len(times):
         raise UsageError(f"--section {WAVE}: less than a period from {begin:.4g} s on; run longer")
     places, parts = np.minimum((times - start) / interval, (end - start) / interval - 1.0).astype(int), []
@@ -83,7 +84,9 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
         curves = [CubicHermiteSpline(known, *each) for each in ((x, v_x), (y, v_y))]
         parts.append([curve(there, order) for order in (0, 1) for curve in curves])
     found = {name: np.concatenate(each) for name, each in zip(_STATE, zip(*parts, strict=True), strict=True)}
-    return found, f"in each period of the wave of {frequency:.4g} Hz"
+    together = round((common_period(system) or 0.0) * frequency)
+    repeat = f"; the waves repeat together every {together} dots" if together > 1 else ""
+    return found, f"at each wave of {frequency:.4g} Hz{repeat}"
 
 
 def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
@@ -96,4 +99,4 @@ def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
     if kind not in kinds:
         known = f"give one of {', '.join(sorted({*kinds.tolist()}))}" if len(kinds) else "run longer"
         raise UsageError(f"--section {kind}: {result.path} has none from {begin:.4g} s on; {known}")
-    return {name: result.read("events", name)[there][kinds == kind][-MOST:] for name in _STATE}
+    return {name: result.read("events", name)[there][kinds == kind] for name in _STATE}

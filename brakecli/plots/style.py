@@ -50,13 +50,15 @@ _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
 
 
 @contextmanager
-def applied(narrow: bool = False) -> Iterator[None]:
+def applied(narrow: bool = False, titled: bool = True) -> Iterator[None]:
     """Draw with this style, not the user's own; do not warn of glyphs that the font lacks.
 
-    Figures that are `narrow` have a single column of panels and no title, for a page on a small screen.
+    Figures that are `narrow` have a single column of panels, for a small screen. Those of a page, which has the
+    title itself, are not `titled`.
     """
     look = {f"{group}.{key}": value for group, values in _LOOK for key, value in values.items()}
     look |= {"figure.figsize": (NARROW, NARROW)} if narrow else {}
+    look |= {} if titled else {"figure.titlesize": 0.0}
     with matplotlib.style.context(["default", look]), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
@@ -86,7 +88,8 @@ def headed(width: float, height: float, title: str, *lines: str, columns: int = 
     The lines are wrapped to the width; the height counts one line for each.
     """
     if is_narrow():
-        width, height, title = NARROW, 0.85 * height * columns, ""
+        width, height = NARROW, 0.85 * height * columns
+    title = title if matplotlib.rcParams["figure.titlesize"] else ""
     bold, plain = {"size": 13, "weight": "bold"}, {"size": 10.0, "color": "#444444"}
     wrapped = [
         (step, text, look)

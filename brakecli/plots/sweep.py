@@ -1,6 +1,5 @@
 """What curves and maps of a sweep share: numbers over rising axes, missing ones as NaN; heading, legend, looks."""
 
-import json
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -209,7 +208,7 @@ def gather(
         title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
     )
     if ATTRACTOR in known:
-        picture = replace(picture, attractors=tuple(_attractors(result)))
+        picture = replace(picture, attractors=tuple(_attractors(variables)))
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
         picture = replace(_selected(picture, wanted, result), findings=())
     for axis in picture.axes:
@@ -258,19 +257,16 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     return variables
 
 
-def _attractors(result: StoredResult) -> Iterator[str]:
-    """Number, regime, frequency, amplitude and share of each attractor."""
-    names, rows = ("regime", "frequency", "amplitude", "share"), list[tuple[Any, ...]]()
-    if isinstance(saved := result.attributes.get("attractors"), str):  # by xarray, without groups
-        try:
-            rows = [
-                (str(one["regime"]), *(float(one[name] or 0.0) for name in names[1:])) for one in json.loads(saved)
-            ]
-        except (ValueError, TypeError, LookupError, RecursionError) as error:
-            raise style.unreadable(result, "its attribute attractors is not a list of attractors") from error
-    else:
-        rows = [*zip(*(style.read_column(result, name, "attractors").tolist() for name in names), strict=True)]
-    for number, (regime, frequency, amplitude, share) in enumerate(rows, start=1):
+def _attractors(variables: Mapping[str, style.Array]) -> Iterator[str]:
+    """Number, regime, frequency, amplitude and share of each attractor, by its points."""
+    numbers = variables[ATTRACTOR]
+    for number in range(1, int(np.nanmax(numbers, initial=0)) + 1):
+        here = numbers == number
+        regimes, counts = np.unique(variables["regime"][here], return_counts=True)
+        regime, share = str(regimes[counts.argmax()]), float(here.mean())
+        frequency, amplitude = (float(np.median(variables[name][here])) for name in ("frequency", "amplitude"))
+        if np.all(variables["excitation"][here] == Excitation.NONE):
+            amplitude = 0.0  # what dies comes to steady sliding
         factor, unit = style.prefixed(amplitude, "m")
         tone = f", {frequency:.4g} Hz" if frequency > 0.0 else ""
         size = f", {factor * amplitude:.3g} {unit}" if amplitude else ""

@@ -1,5 +1,6 @@
 """Two results of one kind, their curves over each other."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -21,18 +22,22 @@ _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the thin 
 _SHOWN = {"stability": ("frequencies", "growth_rates"), "sweep": ("amplitude", "frequency")}
 
 
-def draw(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
-    """The figure of two results; raises UsageError where their kind has no curves."""
+def draw(results: tuple[StoredResult, StoredResult], variable: str, names: Sequence[str] = ()) -> Figure:
+    """The figure of two results, by the names of their files or others.
+
+    Raises UsageError where their kind has no curves.
+    """
     a, b = results
     kind = str(a.attributes.get("kind"))
     if kind != b.attributes.get("kind") or kind not in ("run", *_SHOWN):
         raise UsageError(f"{a.path}: only two runs, sweeps, or results of stability have curves to compare")
-    return _runs(results, variable or "vx") if kind == "run" else _curves(results, kind, variable)
+    names = names or [result.path.name for result in results]
+    return _runs(results, variable or "vx", names) if kind == "run" else _curves(results, kind, variable, names)
 
 
-def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
+def _runs(results: tuple[StoredResult, StoredResult], variable: str, names: Sequence[str]) -> Figure:
     pictures = [RunPicture(result, variable) for result in results]
-    lines = [f"{result.path.name}: {picture.summary}" for result, picture in zip(results, pictures, strict=True)]
+    lines = [f"{name}: {picture.summary}" for name, picture in zip(names, pictures, strict=True)]
     title = pictures[0].title if pictures[0].title == pictures[1].title else "Two runs"
     figure = style.headed(_WIDTH, 8.6, title, *lines, hspace=0.06)
     panels = figure.subplots(3, 1)
@@ -41,15 +46,15 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     look = scaled(variable, np.concatenate(details), np.concatenate(details))
     envelopes = [_wider(picture) for picture in pictures]
     whole = np.concatenate([end for envelope in envelopes for end in envelope[1:]])
-    name = pictures[0].whole
-    whole_look = scaled(name, whole, whole)
+    shown = pictures[0].whole
+    whole_look = scaled(shown, whole, whole)
     times = [picture.detail["time"] for picture in pictures]
     times = [time - (0.0 if same_end else time[-1]) for time in times]
     highest = max((picture.spectrum[2] for picture in pictures), key=style.largest)
     scale, label = style.density(highest, pictures[0].spectrum[1], VARIABLES[variable][3])
     label = label.removeprefix("power spectral ") if style.is_narrow() else label
-    for number, (result, picture, curve) in enumerate(zip(results, pictures, _LOOKS, strict=True)):
-        panels[0].plot(times[number], look(picture.detail[variable]), label=_name(result), **curve)
+    for number, (name, picture, curve) in enumerate(zip(names, pictures, _LOOKS, strict=True)):
+        panels[0].plot(times[number], look(picture.detail[variable]), label=_plain(name), **curve)
         time, lowest, highest = envelopes[number][0], *map(whole_look, envelopes[number][1:])
         if number == 0:
             panels[1].fill_between(time, lowest, highest, color=curve["color"], lw=1.5)
@@ -61,12 +66,12 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str) -> Figure:
     _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
     part = pictures[0].part if pictures[0].part == pictures[1].part else "Last part of each"
     panels[0].set(title=f"{part}: {VARIABLES[variable][0]}", ylabel=look.label)
-    style.make_room(panels[0], 0.2)
-    panels[0].legend(loc="upper right", ncols=2)
+    style.make_room(panels[0], 0.4 if style.is_narrow() else 0.2)
+    panels[0].legend(loc="upper right", ncols=1 if style.is_narrow() else 2)
     spans = [edge for picture in pictures for edge in picture.span]
     _along(panels[1], "time", [min(spans), max(spans)], "s")
     more = "" if style.is_narrow() else ", least and largest"
-    panels[1].set(title=f"Whole runs: {VARIABLES[name][0]}{more}", ylabel=whole_look.label)
+    panels[1].set(title=f"Whole runs: {VARIABLES[shown][0]}{more}", ylabel=whole_look.label)
     _spectra(panels[2], pictures, variable, scale, label)
     figure.align_ylabels()
     return figure
@@ -98,12 +103,12 @@ def _along(axes: Axes, name: str, ends: list[float], unit: str) -> None:
     style.set_ticks(axes.xaxis, low, high, unit, name)
 
 
-def _name(result: StoredResult) -> str:
-    """The name of a file for a legend, in which dollar signs would begin a formula."""
-    return result.path.name.replace("$", r"\$")
+def _plain(name: str) -> str:
+    """A name for a legend, in which dollar signs would begin a formula."""
+    return name.replace("$", r"\$")
 
 
-def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str) -> Figure:
+def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str, labels: Sequence[str]) -> Figure:
     """Numbers along the one axis that both results have."""
     known = results[0].variables("/")
     critical = kind == "sweep" and all("critical" in result.variables("/") for result in results)
@@ -111,16 +116,15 @@ def _curves(results: tuple[StoredResult, StoredResult], kind: str, variable: str
     axis = _axis_of(results, names)
     units = {name: style.unit_of(known[name].attributes) for name in (axis, *names)}
     title = str(results[0].attributes.get("title", "")) or "Two results"
-    files = " and ".join(result.path.name for result in results)
-    figure = style.headed(_WIDTH, 2.6 + 2.2 * len(names), title, files)
+    figure = style.headed(_WIDTH, 2.6 + 2.2 * len(names), title, " and ".join(labels))
     panels = figure.subplots(len(names), 1, sharex=True, squeeze=False)[:, 0]
     places = [style.read_column(result, axis) for result in results]
     for axes, name in zip(panels, names, strict=True):
         columns = [style.read_column(result, name) for result in results]
-        for result, x, values, look in zip(results, places, columns, _LOOKS, strict=True):
+        for each, x, values, look in zip(labels, places, columns, _LOOKS, strict=True):
             order = np.argsort(x, kind="stable")
             for number, line in enumerate(values[order].reshape(len(x), -1).T):
-                label = _name(result) if number == 0 else None
+                label = _plain(each) if number == 0 else None
                 marker = "o" if len(x) <= FEW else ""
                 axes.plot(x[order], line, marker=marker, ms=3.0 + look["lw"], label=label, **look)
         drawn = np.concatenate([values.ravel() for values in columns])

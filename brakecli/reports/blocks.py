@@ -88,10 +88,12 @@ class Part:
 
 @dataclass(frozen=True)
 class Pair:
-    """Two results beside each other: pictures of both together, or one of each."""
+    """Two results beside each other, named by what differs: pictures of both together, or one of each."""
 
     title: str
-    changed: Table
+    names: Sequence[str]
+    titles: Sequence[str]  # of their own pages
+    changed: Sequence[Any]  # blocks
     numbers: Table
     pictures: Sequence[Picture]
 
@@ -100,7 +102,7 @@ def picture(words: str, draw: Callable[[], Figure]) -> Picture:
     """The picture that a function draws, for both widths."""
     images = []
     for narrow in (False, True):
-        with style.applied(narrow):
+        with style.applied(narrow, titled=False):
             png = Image.open(BytesIO(style.rendered(draw(), ".png", _DPI))).convert("RGB")
         stream = BytesIO()
         few = png.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)  # rare colours, too
@@ -126,6 +128,11 @@ def shown(value: Any, unit: str = "") -> str:
         return (", ".join(texts) or "none") + more
     factor, unit = style.prefixed(abs(float(value)), unit)
     return f"{style.readable(factor * float(value))} {unit}".rstrip().replace(" ", "\u00a0")
+
+
+def percent(part: float) -> str:
+    """A change, as a part of what was there before, in per cent."""
+    return f"{100.0 * part:+.3g}\u00a0%".replace("-", "−")
 
 
 def rounded(value: Any, digits: int) -> Any:

@@ -1,6 +1,7 @@
 """The part of a page about a run: whether the shoe vibrates, why, what to change, and how sure that is."""
 
 import math
+import re
 import shlex
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
@@ -23,7 +24,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
-from brakecli.reports.blocks import Code, Part, Section, Table, Texts, numbers_of, picture, rows_of, shown
+from brakecli.reports.blocks import Code, Part, Section, Table, Texts, numbers_of, percent, picture, rows_of, shown
 from brakecli.runs.advise import AdviceReport, advise
 from brakecli.solver.motion import Counted
 from brakecli.sweeps.result import unit
@@ -36,6 +37,7 @@ MOST_SENSITIVE, MOST_CHANGES = 6, 5  # keys that are shown; the latter on the fi
 MOST_SECONDS = 60.0  # what it may take to ask all
 _UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
+_LENGTH = re.compile(r"(\d+(?:\.\d+)?(?:e[-+]\d+)?) m(?![\w/²·])")
 _WORDS = {
     Regime.RELAXATION: "It vibrates, with stick in every cycle or nearly (relaxation)",
     Regime.QUASI_HARMONIC: "It vibrates, without stick (quasi-harmonic)",
@@ -56,19 +58,23 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     found, loaded = result.attributes, case_of(result)
     advice = advise(loaded, KEYS, MARGIN, progress, most=MOST_SECONDS)
     again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
+    left_out = _sentences("left out: ", found.get("left_out", ()))
     sections = [
         Section("Case", case_blocks(loaded)),
         Section("Stability of steady sliding", [*_stability(advice)]),
         Section("Regime, and its evidence", _regime(result)),
-        Section("Accuracy", [*_accuracy(result), Texts(_sentences("left out: ", found.get("left_out", ())))]),
-        Section("Warnings", [Texts(_warnings(found))]),
+        Section(
+            "Accuracy", [*_accuracy(result), Texts([*_sentences("", found.get("adjustments", ())), *left_out])]
+        ),
+        Section("Warnings", [Texts(_sentences("", found.get("warnings", ())) or ["There are none."])]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
     stretches = [
         f"It vibrates from {shown(start, 's')} to {shown(end, 's')}: {shown(rate, 'Hz')} at {shown(speed, 'm/s')}."
         for start, end, rate, _, speed in _vibrations(result)
     ]
-    answer = [*stretches, _sentence(found), f"By theory: {advice.conclusion()}."]
+    theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
+    answer = [*stretches, _sentence(found), theory]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
     numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
     numbers = {**numbers, **numbers_of(named(fields.ADVICE, "critical_friction", "margin"), advice.numbers())}
@@ -98,7 +104,7 @@ def _changes(changes: Iterable[Change], margin: float) -> Table:
         (
             each.parameter,
             shown(each.start, unit(each.parameter)),
-            "no help" if each.to is None else shown(float(each.rounded), unit(each.parameter)),
+            "no help" if each.to is None else _target(each),
             shown(each.critical_friction and float(f"{each.critical_friction:.4g}")),
         )
         for each in changes
@@ -106,9 +112,16 @@ def _changes(changes: Iterable[Change], margin: float) -> Table:
     return Table(rows, ("what to change", "from", f"to, for a margin of {margin:.0%}", "critical friction then"))
 
 
+def _target(change: Change) -> str:
+    """The value that a change leads to, with what that is in per cent of the present one."""
+    value = float(change.rounded)
+    part = f" ({percent(value / change.start - 1.0)})" if change.start else ""
+    return shown(value, unit(change.parameter)) + part
+
+
 def case_blocks(loaded: LoadedCase) -> list[Any]:
     """Every key of a case with its value and unit, and the text to copy."""
-    keys = {key: value for key, value in flat(loaded.case.model_dump(mode="json")) if value is not None}
+    keys = {key: value for key, value in flat(loaded.case.model_dump(mode="json")) if value not in (None, [])}
     del keys["title"]
     rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys.items()]
     idle, head = [row for row in rows if row[0].startswith(_IDLE)], ("key", "value", "meaning")
@@ -128,7 +141,7 @@ def _sentence(found: Mapping[str, Any]) -> str:
     if found.get("status") == "failed":
         return f"The run failed: {found.get('failure', '')}."
     regime, numbers = found.get("regime"), []
-    reasons = "; ".join(map(str, found.get("reasons", ())))
+    reasons = "; ".join(_reasons(found))
     words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
     if regime == Regime.DAMPED and found.get("excitation") == Excitation.FORCED:
         words = "It does not vibrate by itself: the roughness of the wheel shakes it (damped, forced)"
@@ -142,6 +155,13 @@ def _sentence(found: Mapping[str, Any]) -> str:
         if numbers and (share := found.get(name)):
             numbers.append(f"{what} {share:.1%} of the time")
     return f"{', '.join([words, *numbers])}: {reasons}."
+
+
+def _reasons(found: Mapping[str, Any]) -> list[str]:
+    """Why the regime is what it is; lengths have the same prefix as elsewhere on the page."""
+    return [
+        _LENGTH.sub(lambda each: shown(float(each[1]), "m"), str(reason)) for reason in found.get("reasons", ())
+    ]
 
 
 def _stability(advice: AdviceReport) -> Iterator[Any]:
@@ -168,7 +188,7 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
         yield _changes(advice.advice, advice.wanted_margin)
     known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]
     if known:
-        moves = [(each.parameter, f"{each.elasticity:+.3g}\u00a0%".replace("-", "−")) for each in known]
+        moves = [(each.parameter, percent(0.01 * (each.elasticity or 0.0))) for each in known]
         yield Table(moves, ("what moves it most", "critical friction for 1 % more"))
 
 
@@ -203,7 +223,7 @@ def _regime(result: StoredResult) -> list[Any]:
         (name.replace("_", " "), shown(value, fields.evidence_unit(name)))
         for name, value in sorted(evidence.items())
     ]
-    reasons = Texts([f"{reason[:1].upper()}{reason[1:]}." for reason in map(str, found.get("reasons", ()))])
+    reasons = Texts(_sentences("", _reasons(found)))
     intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
     beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
     shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the table decided")
@@ -224,13 +244,10 @@ def _accuracy(result: StoredResult) -> list[Any]:
     return [Table([*rows_of(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
 
 
-def _warnings(found: Mapping[str, Any]) -> list[str]:
-    lines = (str(each) for name in ("warnings", "adjustments") for each in found.get(name, ()))
-    return _sentences("", lines) or ["There are none."]
-
-
 def _sentences(begin: str, lines: Iterable[str]) -> list[str]:
-    return [f"{line[:1].upper()}{line[1:]}." for line in (f"{begin}{each}" for each in lines)]
+    """Lines as sentences; a key at the head of one is spelled as in the case."""
+    texts = (f"{begin}{each}." for each in lines)
+    return [text if text.partition(" ")[0].endswith(":") else f"{text[:1].upper()}{text[1:]}" for text in texts]
 
 
 def _meaning(key: str) -> str:

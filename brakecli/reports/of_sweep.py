@@ -1,5 +1,6 @@
 """The parts of a page about sweeps, comparisons of schemes, stability along a key, branches, and scatter."""
 
+import shlex
 from collections.abc import Iterable
 from dataclasses import replace
 from functools import partial
@@ -8,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.table import Regime
-from brakecli.errors import UsageError, escaped
+from brakecli.case.read import parse_table
+from brakecli.errors import CaseError, UsageError, escaped
 from brakecli.files import fields
 from brakecli.files.field import Field
 from brakecli.files.read import StoredResult
@@ -35,6 +37,7 @@ from brakecli.reports.blocks import (
 )
 from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
+from brakecli.scattering.study import Study
 from brakecli.sweeps.point import Status
 
 MOST_FAILURES = 20
@@ -45,8 +48,8 @@ _IDLE = ("settled", "settled_from", "steps", "contact_evaluations", "unconverged
 _COMMANDS = {
     "sweep": "sweep SWEEP.toml",
     "comparison": "compare-schemes CASE.toml",
-    "stability": "stability CASE.toml --vary …",
-    "branch": "branch CASE.toml --parameter …",
+    "stability": "stability CASE.toml --vary {}",
+    "branch": "branch CASE.toml --parameter {}",
     "scatter": "scatter STUDY.toml",
 }
 _QUESTIONS = {
@@ -155,7 +158,11 @@ def part_of_other(result: StoredResult) -> Part:
         answer = [f"{sentence[:1].upper()}{sentence[1:]}."]
     if kind == "branch":
         tables.append(_special(result))
+    sections = [Section("Numbers", tables)]
     if kind == "scatter":
+        said, tables_of_study = _study(result)
+        answer.append(said)
+        sections.insert(0, Section("Study", tables_of_study))
         names = fields.OUTCOME, *fields.PROBABILITY
         rows = [(NAMES.get(name, name), *more) for name, *more in _rows(result, "/", names)]
         tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
@@ -169,13 +176,59 @@ def part_of_other(result: StoredResult) -> Part:
         method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))
         steps = f"steps of {shown(float(step), 's')}" if np.isfinite(step) else "its own steps"
         answer = [f"Recommended: {method} with {steps}, whose error is {error:.2g}."]
-    return _plain(result, kind, answer, drawn, [Section("Numbers", tables)], numbers)
+    return _plain(result, kind, answer, drawn, sections, numbers)
+
+
+def _study(result: StoredResult) -> tuple[str, list[Table]]:
+    """Which brakes a study is about and what it calls squeal; what scatters, and how it was asked."""
+    name = "resolved_study_toml" if "resolved_study_toml" in result.attributes else "study_toml"
+    try:
+        study = parse_table(Study, result.text(name), "its study")
+    except CaseError as error:
+        raise style.unreadable(result, f"the study in it is not valid: {error.problems[0]}") from error
+    laws = [
+        (
+            ", ".join(each.paths),
+            each.distribution,
+            ", ".join(
+                f"{name} {shown(value, key_unit(each.paths[0]))}"
+                for name in ("mean", "deviation", "mode", "low", "high")
+                if (value := getattr(each, name)) is not None
+            ),
+        )
+        for each in study.parameter
+    ]
+    asked = [
+        (
+            name,
+            shown(getattr(study, name), "Hz" if name == "band" else ""),
+            str(Study.model_fields[name].description),
+        )
+        for name in ("samples", "seed", "sampling", "method", "band", "indices_of", "correlation")
+        if getattr(study, name) is not None
+    ]
+    band = " from {} to {}".format(*(shown(each, "Hz") for each in study.band)) if study.band else ""
+    scatter = f"{', '.join(study.names)} {'scatters' if len(study.names) == 1 else 'scatter'}"
+    said = f"Such brakes are those of the case in which {scatter}; squeal is a vibration of their own{band}."
+    return said, [Table(laws, ("what scatters", "distribution", "its numbers")), Table(asked)]
 
 
 def _unit_of_key(result: StoredResult) -> str:
     """The unit of the key, or of the first of the keys, along which a result was computed."""
     keys = result.attributes.get("parameters", result.attributes.get("parameter", ""))
     return key_unit(str(np.ravel(keys)[0]).partition(",")[0])
+
+
+def _range(result: StoredResult, kind: str) -> str:
+    """The key, or keys, along which a result was computed, with both ends, as an option of its command."""
+    key, ends = str(result.attributes.get("parameter", "")), list[Any]()
+    if kind == "branch":
+        ends = [result.attributes.get(name, 0.0) for name in ("lower", "upper")]
+    if kind == "stability":
+        values = style.read_column(result, result.variables("/")["frequencies"].dims[0])
+        key = ",".join(map(str, result.attributes.get("parameters", ())))
+        ends = [float(values[0]), float(values[-1]), len(values)]
+    return escaped(shlex.quote(f"{key}={':'.join(map(repr, ends))}"))
 
 
 def _special(result: StoredResult) -> Table:
@@ -215,7 +268,10 @@ def _plain(
     """A part with what is said of every result."""
     loaded, attributes = case_of(result), result.attributes
     given = str(attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", ""))
-    again = repeat(result, f"brakecli {_COMMANDS[kind]} -o again.h5", given)
+    again = repeat(result, f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5", given)
+    again += [Texts(["CASE.toml holds the whole case, which stands above as a file."])] * (
+        "CASE" in _COMMANDS[kind]
+    )
     sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
     title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)
     asks, what = question or _QUESTIONS[kind], "This names the keys of such a case to change, and to which values:"

@@ -8,10 +8,12 @@ from brakecli.errors import UsageError
 from brakecli.files.contents import changed, keys
 from brakecli.files.read import StoredResult
 from brakecli.plots import two
-from brakecli.reports.blocks import Pair, Part, Table, key_unit, picture, rounded, shown
+from brakecli.reports.blocks import Pair, Part, Table, Texts, key_unit, percent, picture, rounded, shown
 
 PICTURE = "Both results in one picture, the first one wide, the second one dashed"
 DIGITS, MOST_PART = 4, 10.0  # to which numbers are compared; increase above which there is no per cent
+_NAMED = 2  # changed keys by which the results are named
+_CHOSEN = "solver.duration", "output.sample_interval"  # by the program, where a file gives no numbers
 _SAME = "same"
 
 
@@ -21,23 +23,37 @@ def pair_of(results: tuple[StoredResult, StoredResult], parts: Sequence[Part]) -
     if len(kinds) != 1:
         return None
     a, b = parts
-    case = [
-        (each["name"], each["a"], each["b"], key_unit(each["name"]))
-        for each in changed(*map(keys, results))
-        if each["name"] != "title" and {} not in each.values()  # which stands for a table without keys
-    ]
-    names = {**a.numbers, **b.numbers}
-    columns = [[rounded(part.numbers.get(name, (None,))[0], DIGITS) for name in names] for part in parts]
-    both = zip(names, *columns, (units for _, units in names.values()), strict=True)
+    given = [keys(result, ("case_toml",)) for result in results]
+    fixed = [name for name in _CHOSEN if any(isinstance(each.get(name), int | float) for each in given)]
+    case, chosen = list[tuple[Any, ...]](), list[str]()
+    for name, *values in (each.values() for each in changed(*map(keys, results))):
+        texts = [shown(value, key_unit(name)) for value in values]
+        if name in _CHOSEN and name not in fixed:
+            chosen += [f"{name} ({', '.join(texts)})"] * (texts[0] != texts[1])
+        elif name != "title" and {} not in values:  # which stands for a table without keys
+            case.append((name, *values, key_unit(name)))
+    known = {**a.numbers, **b.numbers}
+    columns = [[rounded(part.numbers.get(name, (None,))[0], DIGITS) for name in known] for part in parts]
+    both = zip(known, *columns, (units for _, units in known.values()), strict=True)
     numbers = [row for row in both if {*map(str, row[1:3])} - {"None", ""}]
+    single = [row for row in case if all(isinstance(each, str | int | float) for each in row[1:3])][:_NAMED]
+    apart = [", ".join(f"{row[0]} = {shown(row[side], row[3])}" for row in single) for side in (1, 2)]
+    names = [", ".join(filter(None, pair)) for pair in zip((a.name, b.name), apart, strict=True)]
     try:
-        pictures = [picture(PICTURE, partial(two.draw, results, ""))]
+        pictures = [picture(PICTURE, partial(two.draw, results, "", names))]
     except UsageError:  # no curves that could be drawn over each other
         pictures = [each.picture for each in parts if each.picture]
-    title = a.title if a.title == b.title else f"{a.title} – {b.title}"
+    title, titles = f"{a.title} – {b.title}", [a.title, b.title]
+    if a.title == b.title:
+        steps = [f"{name} {shown(one, units)} → {shown(other, units)}" for name, one, other, units in single]
+        title = f"{a.title}: {', '.join(steps) or ' – '.join(names)}"
+        titles = [": ".join(filter(None, pair)) for pair in zip(titles, apart, strict=True)]
     files = tuple(f"{letter}: {part.name}" for letter, part in zip("AB", parts, strict=True))
     head = ("", *files, "B against A")
-    return Pair(title, _table(case, head), _table(numbers, head), pictures)
+    blocks: list[Any] = [_table(case, head) if case else Texts(["The cases are the same."])]
+    if chosen:
+        blocks.append(Texts([f"Not given as numbers in the files, and different, too: {', '.join(chosen)}."]))
+    return Pair(title, names, titles, blocks, _table(numbers, head), pictures)
 
 
 def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:
@@ -52,5 +68,5 @@ def _change(a: Any, b: Any) -> str:
     if a and all(isinstance(each, int | float) and not isinstance(each, bool) for each in (a, b)):
         part = b / a - 1.0
         if -1.0 <= part < MOST_PART:
-            return f"{100.0 * part:+.3g}\u00a0%".replace("-", "−")
+            return percent(part)
     return "differs"

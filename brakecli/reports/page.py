@@ -3,6 +3,7 @@
 import base64
 import hashlib
 from collections.abc import Sequence
+from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -52,6 +53,8 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         if len(results) == 2:
             with open_result(results[0]) as a, open_result(results[1]) as b:
                 pair = pair_of((a, b), parts)
+        if pair:
+            parts = [replace(part, title=title) for part, title in zip(parts, pair.titles, strict=True)]
         script = _file("report.js")
         loader = jinja2.FunctionLoader(_file)
         environment = jinja2.Environment(

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -53,7 +53,7 @@ class AdviceReport:
     wanted_margin: float
     sensitivities: list[Sensitivity]
     advice: list[Change]
-    check: CheckRun | None
+    checks: Mapping[str, CheckRun]  # by the changed key
     thresholds: Thresholds
     left_out: str = ""  # what was not asked, as it takes too long
     squeal: Left | None = None  # of the case itself, under scatter
@@ -68,6 +68,11 @@ class AdviceReport:
     def stable(self) -> bool | None:
         """Whether sliding is stable; None where the wheel stands, or nothing presses the shoe."""
         return self.stability.stable if self.stability.belt_speed else None
+
+    @property
+    def check(self) -> CheckRun | None:
+        """The run with the first advice followed; None without one."""
+        return self.checks.get(self.advice[0].parameter) if self.advice else None
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
@@ -106,7 +111,7 @@ class AdviceReport:
         if critical == 0.0:
             yield "unstable at any friction, however small"
         elif critical is not None:
-            yield f"stable up to {critical:.3g}{_far(self.margin, own)}"
+            yield f"stable up to a friction coefficient of {critical:.3g}{_far(self.margin, own)}"
             if report.stable and critical < own:
                 changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
                 turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)
@@ -179,13 +184,15 @@ def advise(
             for done, path in enumerate(keys):
                 advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
     sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
-    advice, check = _ranked(case, advice, progress)
+    advice, checks = _ranked(case, advice, progress)
     both = thresholds(case, system, report, progress)
-    return AdviceReport(case.title, system, report, critical, margin, sensitivities, advice, check, both, left_out)
+    return AdviceReport(
+        case.title, system, report, critical, margin, sensitivities, advice, checks, both, left_out
+    )
 
 
-def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[Change], CheckRun | None]:
-    """Advice that a run confirms first, what still vibrates last, small changes first; and the run of the first.
+def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[Change], dict[str, CheckRun]]:
+    """Advice that a run confirms first, what still vibrates last, small changes first; and the runs by key.
 
     Runs are made for small changes first.
     """
@@ -201,8 +208,7 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
     def rank(change: Change) -> tuple[bool, int, float]:
         return change.to is None, places.get(change.check, 2), change.size
 
-    found = sorted((replace(each, check=regimes.get(each.parameter)) for each in advice), key=rank)
-    return found, checks.get(found[0].parameter) if found else None
+    return sorted((replace(each, check=regimes.get(each.parameter)) for each in advice), key=rank), checks
 
 
 def _to_check(case: Case, change: Change) -> tuple[System, float] | None:

@@ -10,7 +10,8 @@ import numpy as np
 
 from brakecli.branches.answers import Answers
 from brakecli.branches.explore import Explorer, Followed
-from brakecli.branches.line import Line
+from brakecli.branches.line import ALONE, Line
+from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_resolved
 from brakecli.errors import UsageError, printable
 from brakecli.files import fields
@@ -22,6 +23,8 @@ from brakecli.solver.compile import Floats
 from brakecli.solver.motion import Counted
 
 MULTIPLIERS = 4
+EQUATIONS = ALONE | {"roughness"}
+"""Tables of a case whose keys enter the equations of motion."""
 
 
 @dataclass(frozen=True)
@@ -34,6 +37,11 @@ class Start:
 
 def line_of(loaded: LoadedCase, keys: Sequence[str], low: float, high: float, option: str) -> Line:
     """The line of cases that an option asks for; raises CaseError and UsageError where there is none."""
+    for key in keys:
+        if key_path(key)[0] in Case.model_fields.keys() - EQUATIONS:
+            raise UsageError(
+                f"{option}: {printable(key)}: is no quantity of the shoe; follow e.g. friction.coefficient"
+            )
     line = Line(loaded.case, keys, low, high, option)
     for p in (0.0, 1.0):
         system = line.system(p)  # so that a wrong end is known before anything is computed

@@ -240,7 +240,7 @@ def _report(
         indices=index,
         columns={**kept, "squeal": squealing.astype(np.int64)},
         values=drawing.values,
-        notes=_notes(study, count, index),
+        notes=[*loaded.beside(loaded.base.case), *_notes(study, count, index)],
     )
 
 
@@ -290,7 +290,8 @@ def _notes(study: Study, count: int, index: Indices) -> list[str]:
 def _write(result: ResultFile, report: ScatterReport) -> None:
     """Everything that the file holds."""
     loaded, study = report.loaded, report.loaded.study
-    result.set_attributes({**origin("scatter", loaded.title, loaded.base), "study_toml": loaded.text})
+    texts = {"study_toml": loaded.text, "resolved_study_toml": loaded.resolved}
+    result.set_attributes({**origin("scatter", loaded.title, loaded.base), **texts})
     result.set_fields(fields.SCATTER, report.numbers())
     result.axis("/", fields.SAMPLE, np.arange(report.samples))
     sets, many, _ = report.values.shape

@@ -8,9 +8,12 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
+import tomli_w
 from pydantic import Field
 from scipy import stats
 
+from brakecli.analysis.stability.advice import numbers
+from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, read_text
 from brakecli.case.tables import MISSING, Number, Positive, Table, Title, described, from_list
 from brakecli.errors import CaseError, Problem, found
@@ -20,6 +23,7 @@ SCRAMBLINGS = 8
 """Sequences of a study, each with its own scrambling: what they differ by gives the intervals."""
 MOST_SAMPLES = 10_000_000
 _LIMIT = 3.0  # deviations from the mean to a limit, where only limits are given: 99.7 % lie between
+_RARE = 1.35e-3  # probability beyond three deviations of a normal distribution
 _LEAST_EIGENVALUE = 1e-9
 _LEAST_KEPT = 1e-12  # probability between limits
 
@@ -122,6 +126,15 @@ class Parameter(Table):
         within = first + parts * (last - first)
         return np.asarray(law.isf(within) if above else law.ppf(within), np.float64)
 
+    def beside(self, own: float) -> str:
+        """What is said of a drawing whose own value lies where next to none of the samples do; empty elsewhere."""
+        law = self._law[0]
+        low = float(law.ppf(_RARE)) if self.low is None else self.low
+        high = float(law.isf(_RARE)) if self.high is None else self.high
+        if low <= own <= high:
+            return ""
+        return f"{self.paths[0]}: the case has {own:.4g}, but scatters between {low:.4g} and {high:.4g}"
+
 
 _Row = Annotated[tuple[Number, ...], *from_list]
 
@@ -200,6 +213,18 @@ class LoadedStudy:
     text: str
     base: LoadedCase
     name: str  # of its file
+
+    def beside(self, case: Case) -> list[str]:
+        """Sentences on values of a drawing that lie beside all samples."""
+        own = numbers(case)
+        found = ((each, own.get(key_path(path))) for each in self.study.parameter for path in each.paths[:1])
+        said = (each.beside(value) for each, value in found if isinstance(value, float))
+        return [each for each in said if each]
+
+    @property
+    def resolved(self) -> str:
+        """The study as TOML, with overrides and defaults filled in."""
+        return tomli_w.dumps(self.study.model_dump(mode="json", exclude_none=True))
 
     @property
     def title(self) -> str:

@@ -181,7 +181,10 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
 def sweep_of(tables: dict[str, Any], base: LoadedCase, listed: Listed | None = None) -> LoadedSweep:
     """The sweep of the tables that its file would have, over a case at hand. Raises `CaseError`."""
     text, name = tomli_w.dumps(tables), "the sweep"
-    return _checked(parse_table(Sweep, text, name), text, name, base, listed)
+    try:
+        return _checked(parse_table(Sweep, text, name), text, name, base, listed)
+    except CaseError as error:  # lines of that text would help nobody
+        raise CaseError([replace(each, line=0) for each in error.problems]) from None
 
 
 def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase, listed: Listed | None) -> LoadedSweep:

@@ -188,13 +188,18 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
     known = done.all(axis=0) & ~on_its_way
     differ = known & (other | (apart & lasting))
     count, size, decided, said = int(differ.sum()), differ.size, int(known.sum()), list[str]()
-    if count:
+    lasts = regime != b"damped"
+    simple = done.all() and differ.ndim == 1 and (differ == (lasts[0] != lasts[1])).all()
+    if count and simple and (ends := _ends_of_loop(journal.plan, lasts)):
+        said.append(f"hysteresis at {count} of {size} points: {ends}")
+    elif count:
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
         more = f"; and {count - 3} more" if count > 3 else ""
         said.append(f"hysteresis at {count} of {size} points: {places}{more}")
     elif decided:
-        those = f" at the {decided} points that are decided" if decided < size else ""
+        those = f" at the {decided} point{'s that are' if decided > 1 else ' that is'} decided"
+        those *= decided < size
         same = "the motion is the same on the way up and on the way down"
         if damped := int((known & ~lasting).sum()):
             both = "damped on the way up and on the way down"
@@ -203,9 +208,9 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
     if decided < size:
         doubtful = int((~known & apart).sum())
         ways = f"; the amplitudes of the two ways differ at {doubtful} of them" if doubtful else ""
-        which = "which failed, are undecided or still on their way in a direction"
-        undecided = f"{size - decided} points, {which}"
-        said.append(f"hysteresis is not known at {undecided}{ways}")
+        which = "s, which failed, are undecided or still on their way"
+        which = which if size - decided > 1 else ", which failed, is undecided or still on its way"
+        said.append(f"hysteresis is not known at {size - decided} point{which} in a direction{ways}")
     return differ.astype(np.int64), said
 
 
@@ -223,6 +228,21 @@ def _on_undecided(journal: Journal) -> Iterator[str]:
     by_itself = journal.plan.case({}).solver.duration == "settled"
     remedy = '; solver.duration = "settled" runs as long as each needs' * ("run " in longest and not by_itself)
     yield f"{count} of {size} points are undecided, {len(most)} of them: {longest}{remedy}"
+
+
+def _ends_of_loop(plan: Plan, lasts: NDArray[Any]) -> str:
+    """Between which values vibration begins and ends on both ways, (2, points); empty if not once on each."""
+    (axis,) = plan.sweep.axis
+    values, said = np.array(_values(axis)), list[str]()
+    for way, row, order in (("up", lasts[0], np.argsort(values)), ("down", lasts[1], np.argsort(-values))):
+        changes = np.flatnonzero(np.diff(row[order]))
+        if len(changes) != 1:
+            return ""
+        before, after = order[changes[0] : changes[0] + 2]
+        verb = "begins" if row[after] else "ends"
+        between = f"between {label(float(values[before]))} and {label(float(values[after]))}"
+        said.append(f"{verb} on the way {way} {between}")
+    return f"along {', '.join(axis.parameter)} the vibration {said[0]}, and {said[1]}"
 
 
 def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:

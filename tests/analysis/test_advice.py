@@ -240,16 +240,31 @@ ZERO["link2__stiffness"] = 2e6 * math.sin(math.radians(40.0)) / math.sin(math.ra
     [
         (
             SQUEALS,
-            ["squeals at 174", "stable up to 0.575, 18 % below the case's 0.7", "link2.angle_deg 5 → 7.692"],
+            [
+                "squeals at 174",
+                "stable up to a friction coefficient of 0.575, 18 % below the case's 0.7",
+                "link2.angle_deg 5 → 7.692",
+            ],
         ),
-        ({"friction__coefficient": 0.3}, ["stable up to 0.575, 92 % above the case's 0.3"]),
-        ({"friction__coefficient": 0.0}, ["without friction nothing squeals; stable up to 0.575"]),
+        (
+            {"friction__coefficient": 0.3},
+            ["stable up to a friction coefficient of 0.575, 92 % above the case's 0.3"],
+        ),
+        (
+            {"friction__coefficient": 0.0},
+            ["without friction nothing squeals; stable up to a friction coefficient of 0.575"],
+        ),
         ({"wheel__angular_speed": 0.0}, ["the wheel stands, so that nothing slides"]),
         ({"load__force": -100.0}, ["nothing presses the shoe on the wheel"]),
         ({"link2__angle_deg": 0.0}, ["stable: no friction makes it unstable"]),
         (
             {"link2__angle_deg": -5.0, "friction__coefficient": 80.0, "solver__duration": 0.05},
-            ["at 80 there is no steady sliding: ", "self-locking", "stable up to 68.6, 14 % below", "→"],
+            [
+                "at 80 there is no steady sliding: ",
+                "self-locking",
+                "stable up to a friction coefficient of 68.6, 14 % below",
+                "→",
+            ],
         ),
         (ZERO, ["squeals at", "unstable at any friction, however small", "gives 0.36"]),
     ],
@@ -269,7 +284,7 @@ def test_a_case_above_a_range_of_instability_is_told_so() -> None:
     above = replace(report, stability=stability, critical_friction=0.5)
     assert above.margin == pytest.approx(-0.75)
     words = "the case lies above a range of instability, as stability is lost at 0.5, regained at 0.7"
-    assert f"stable up to 0.5, 75 % below the case's 2; {words}" in above.conclusion()
+    assert f"stable up to a friction coefficient of 0.5, 75 % below the case's 2; {words}" in above.conclusion()
 
 
 def test_what_the_answer_rests_on_is_told() -> None:

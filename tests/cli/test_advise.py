@@ -26,7 +26,9 @@ def test_json_has_the_names_of_the_page_and_the_advised_value_keeps_its_promise(
     assert numbers["critical_friction"] == pytest.approx(0.5753762, abs=1e-7)
     assert numbers["friction_coefficient"] == 0.7
     assert numbers["margin"] == pytest.approx(0.5753762 / 0.7 - 1.0, abs=1e-6)
-    assert numbers["conclusion"].startswith("squeals at 174.3 Hz; stable up to 0.575, 18 % below the case's 0.7; ")
+    assert numbers["conclusion"].startswith(
+        "squeals at 174.3 Hz; stable up to a friction coefficient of 0.575, 18 % below the case's 0.7; "
+    )
     by_key = {each["parameter"]: each for each in numbers["sensitivities"]}
     assert set(by_key["link2.angle_deg"]) >= {"parameter", "value", "elasticity", "derivative"}
     assert by_key["link1.angle_deg"]["elasticity"] is None
@@ -64,7 +66,7 @@ def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: 
         "no help    -           none in 500 to",
     ):
         assert words in table
-    assert "in a sentence     squeals at 174.3 Hz; stable up to 0.575" in table
+    assert "in a sentence     squeals at 174.3 Hz; stable up to a friction" in table
     assert "checked by a run  link2.angle_deg = 7.692: " in table
 
 

@@ -52,7 +52,10 @@ def test_the_starter_can_vibrate_below_its_critical_friction(here: Path, found: 
     assert [mark["kind"] for mark in cycle["special"]] == ["flutter", "fold", "end"]
     fold = cycle["special"][1]
     assert found["coexists_from"] == fold["value"] < found["critical"]
-    assert "can exist beside stable sliding" in found["sentence"]
+    where = (
+        f"from {fold['value']:.4g} on a vibration at {fold['frequency']:.4g} Hz can exist beside stable sliding"
+    )
+    assert where in found["sentence"]
     assert found["critical_windows_lower"] == [found["critical"]]
     assert found["critical_windows_upper"] == [1.0]
 
@@ -159,6 +162,12 @@ def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path
         (("--parameter", "friction.coeff=0:1"), "friction.coeff"),
         (("--parameter", "friction.coefficient,friction.coefficient=0:1"), "no key twice"),
         (("--parameter", "link2.angle_deg=0:95"), "link2.angle_deg"),
+        (
+            ("--parameter", "solver.step=1e-5:1e-4"),
+            "solver.step: is no quantity of the shoe; follow e.g.",
+        ),
+        (("--parameter", "shoe.mass,initial.x=1:2"), "initial.x: is no quantity of the shoe"),
+        (("--parameter", "title=0:1"), "title: is no quantity of the shoe"),
         (("--parameter", "friction.coefficient=0:1", "-o", "a.txt"), ".h5"),
     ],
 )

@@ -380,3 +380,10 @@ def test_quiet_shows_no_bar_and_no_color_no_colours(folder: Path) -> None:
     assert code == 0
     assert "2000/2000" in told
     assert not re.search(rf"{ESCAPE}\[[0-9;]*[34][0-9]", told)  # codes of colours
+
+
+def test_a_starter_with_a_slip_in_its_name_is_asked_about(tmp_path: Path) -> None:
+    slip, own = (brakecli("new", name, cwd=tmp_path) for name in ("scater", "squeal"))
+    assert "so this is that of a case; did you mean scatter?" in slip.err
+    assert own.err == ""
+    assert (tmp_path / "scater.toml").read_bytes() == (tmp_path / "squeal.toml").read_bytes()

@@ -93,6 +93,6 @@ def test_a_cell_where_nothing_lasts_is_empty_however_large_its_amplitude_still_i
     with open_result(tmp_path / "s.h5") as result, applied():
         figure = draw(result)
     mesh = figure.axes[1].collections[0]
-    values = np.ma.asarray(mesh.get_array()).reshape(2, 2)
+    values: Any = np.ma.asarray(mesh.get_array()).reshape(2, 2)
     assert np.ma.getmaskarray(values).tolist() == [[True, False], [False, False]]
     assert "damped: nothing lasts" in [text.get_text() for text in figure.legends[0].get_texts()]

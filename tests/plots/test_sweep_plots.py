@@ -62,7 +62,7 @@ def test_a_computed_sweep_is_drawn_with_its_own_numbers(tmp_path: Path) -> None:
     np.testing.assert_allclose(curve[1:, 1], 1e6 * amplitude[[2, 0]], rtol=1e-12)
     assert np.isnan(curve[0, 1])  # damped, and nothing forces it: no line leads there, and a mark says so
     (mark,) = (line for line in figure.axes[0].get_lines() if line.get_label() == "damped: nothing lasts")
-    assert list(mark.get_xdata()) == [0.3]
+    assert np.ravel(mark.get_xdata()).tolist() == [0.3]
     assert figure.axes[0].get_ylabel() == "amplitude (µm)"
     assert figure.axes[1].get_xlabel() == "friction.coefficient"
     assert figure.texts[0].get_text() == loaded.title

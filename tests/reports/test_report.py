@@ -27,6 +27,7 @@ from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import style
+from brakecli.plots.branch import _other_mode, draw
 from brakecli.reports import blocks, of_run, of_sweep, of_two, page, sweep_map
 from brakecli.reports.page import write_report
 from brakecli.runs.advise import advise
@@ -180,7 +181,17 @@ def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
     assert len(helpful) > of_run.MOST_CHANGES
     names = [each.parameter for each in helpful[: of_run.MOST_CHANGES]]
     assert [cells[0] for _, cells in rows(first)] == ["what to change", *names]
+    change, (_, cells) = helpful[0], rows(first)[1]
+    part = f"{100.0 * (float(change.rounded) / change.start - 1.0):+.3g} %".replace("-", "−")
+    assert cells[2].endswith(f"({part})")
     assert {each.parameter for each in report.advice} <= {cells[0] for _, cells in rows(appendix)}
+
+
+def test_keys_keep_their_spelling_and_lengths_have_a_prefix() -> None:
+    lines = ["solver.duration: settled after 0.1 s", "the pad opens"]
+    assert of_run._sentences("", lines) == ["solver.duration: settled after 0.1 s.", "The pad opens."]
+    found = {"reasons": ["it comes to an amplitude of 8.71e-05 m at 0.05 m/s"]}
+    assert of_run._reasons(found) == ["it comes to an amplitude of 87.1\u00a0µm at 0.05 m/s"]
 
 
 def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_not_see_it(found: Page) -> None:
@@ -194,7 +205,7 @@ def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_n
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("friction.coefficient=0.3", "Nothing has to be changed; stable up to 0.575"),
+        ("friction.coefficient=0.3", "Nothing has to be changed; stable up to a friction coefficient of 0.575"),
         ("wheel.angular_speed=0.0", "No change is known; the wheel stands"),
     ],
 )
@@ -219,8 +230,10 @@ def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
         run(parse_case(TINY, "case", changes), tmp_path / f"{name}.h5", force=False)
     both = reported(tmp_path / "a.h5", tmp_path / "b.h5")
     beside = both.html[: both.html.index('<article id="part-1">')]
-    assert re.findall(r"<h2>(.: ..h5)</h2>", beside) == ["A: a.h5", "B: b.h5"]
-    assert beside.count("By theory: ") == 2
+    apart = [f"shoe.mass = {one}\u00a0kg, friction.coefficient = {two}" for one, two in ((10, 0.6), (12, 0.3))]
+    assert re.findall(r"<h2>(.: .*)</h2>", beside) == [f"A: a.h5, {apart[0]}", f"B: b.h5, {apart[1]}"]
+    assert re.findall("<h1>(.*)</h1>", both.html)[1:] == [f"Tiny: {each}" for each in apart]
+    assert beside.count("By theory, of small vibration and by eigenvalues: ") == 2
     assert beside.count("<figure>") == 1
     found = {cells[0]: (marked, cells[1:]) for marked, cells in rows(beside)}
     assert found["friction.coefficient"] == (True, ["0.6", "0.3", "−50 %"])  # 0.3 / 0.6 - 1
@@ -255,6 +268,25 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
     assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
 
 
+@pytest.mark.parametrize("given", [False, True])
+def test_what_the_program_has_chosen_is_no_change_of_the_user(given: bool, tmp_path: Path, plain: None) -> None:
+    """The interval of samples is a change where files give it; else it is named apart if its digits differ."""
+    text = BASE if given else BASE.replace("output.sample_interval = 1e-4", "")
+    for name, interval in (("a", 1e-4), ("b", 2e-4), ("c", 1e-4 + 1e-16)):
+        case = parse_case(BASE, "case", [f"output.sample_interval={interval!r}"])
+        about: dict[str, Any] = {"title": "T", "resolved_toml": case.resolved, "case_toml": text}
+        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": CRITICAL}, **about)
+    changed, close = (reported(tmp_path / "a.h5", tmp_path / f"{name}.h5").html for name in "bc")
+    row = True, ["output.sample_interval", "100 µs", "200 µs", "+100 %"]
+    assert (row in rows(changed)) == given
+    told = "different, too: output.sample_interval (100\u00a0µs, 200\u00a0µs)."
+    assert (told in changed) != given
+    assert ("The cases are the same." in changed) != given
+    assert "different, too" not in close
+    heading = "T: output.sample_interval 100\u00a0µs → 200\u00a0µs" if given else "T: a.h5 – b.h5"
+    assert f"<h1>{heading}</h1>" in changed
+
+
 def test_branches_have_a_sentence_a_picture_and_their_special_points(
     tmp_path: Path, compiled: None, plain: None
 ) -> None:
@@ -268,10 +300,25 @@ def test_branches_have_a_sentence_a_picture_and_their_special_points(
     assert "of the key" not in page.html
     critical = stability(system_of(parse_case(TINY, "case").case)).critical
     assert critical is not None
+    assert "brakecli branch CASE.toml --parameter friction.coefficient=0.5:0.8 -o again.h5" in page.html
+    with open_result(tmp_path / "r.h5") as stored, style.applied():
+        lines = draw(stored).axes[0].get_lines()
+    looks = {str(line.get_label()): line.get_linestyle() for line in lines}
+    assert (looks["steady sliding"], looks["limit cycle"], looks["unstable"]) == ("-", "-", "--")
     flutter = [cells for _, cells in rows(page.html) if cells[1:2] == ["flutter"]]
     assert [cells[0] for cells in flutter] == ["branch 0, steady sliding", "branch 1, limit cycle"]
     assert {cells[2] for cells in flutter} == {f"{critical.friction:.5g}"}
     assert flutter[0][4] == "–"  # no motion has an amplitude there
+
+
+def test_a_curve_of_frequency_ends_where_another_mode_is_the_least_stable_one() -> None:
+    """Two modes come near each other; from the third place on the second one is the least stable."""
+    both = np.array([[100.0, 110.0], [101.0, 109.0], [102.0, 108.0], [103.0, 107.0]])
+    least = np.where(np.arange(4) < 2, both[:, 0], both[:, 1])
+    factors = np.exp(2j * np.pi * np.concatenate([both, -both], axis=1) / least[:, None])
+    parts = np.stack([factors.real, factors.imag], axis=-1)
+    assert _other_mode(least, parts).tolist() == [2]
+    assert _other_mode(both[:, 0], parts).tolist() == []
 
 
 def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) -> None:
@@ -284,12 +331,28 @@ def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) 
         of_sweep._rows(stored, "/", known)
 
 
-def test_scatter_has_its_probabilities_as_a_table(tmp_path: Path, compiled: None, plain: None) -> None:
+def test_scatter_has_its_study_and_its_probabilities_as_tables(
+    tmp_path: Path, compiled: None, plain: None
+) -> None:
     (tmp_path / "c.toml").write_text(TINY)
     study = '[[parameter]]\nkey = "link2.angle_deg"\ndistribution = "uniform"\nlow = 4.0\nhigh = 6.0\n'
+    study = f"band = [100.0, 2000.0]\n{study}"
     (tmp_path / "s.toml").write_text(f'case = "c.toml"\nmethod = "eigenvalue"\nsamples = 64\n{study}')
-    found = brakecli.scatter(tmp_path / "s.toml", output=tmp_path / "r.h5")
+    found = brakecli.scatter(tmp_path / "s.toml", {"seed": 7}, output=tmp_path / "r.h5")
     page = reported(tmp_path / "r.h5")
+    for row in (
+        ["link2.angle_deg", "uniform", "low 4 deg, high 6 deg"],
+        ["seed", "7", "of the random numbers"],  # that of the shell, not that of the file
+        ["sampling", "sobol", "how samples are drawn"],
+        ["samples", "64", "how many brakes are drawn"],
+    ):
+        assert (False, row) in rows(page.html)
+    assert [cells[1] for _, cells in rows(page.html) if cells[0] == "band"] == ["100 Hz, 2000 Hz"]
+    text = (
+        "Such brakes are those of the case in which link2.angle_deg scatters; squeal is a vibration of their own"
+    )
+    assert f"{text} from 100\u00a0Hz to 2000\u00a0Hz." in page.html
+    assert "solver.theta" not in page.html[: page.html.index("The whole case as a file")]
     squeal = [cells for _, cells in rows(page.html) if cells[0] == "squeal"]
     of = {"outcome": "squeal"}
     names = "probability", "probability_lower", "probability_upper"

@@ -252,7 +252,11 @@ def test_the_starter_of_hysteresis_finds_the_loop_of_the_branch(tmp_path: Path) 
     assert 1 < sum(loop) < 5
     assert report.findings.hysteresis is not None
     assert report.findings.hysteresis.tolist() == loop
-    assert len(report.findings.sentences) == 1
+    first, last = loop.index(1), loop.index(0, loop.index(1)) - 1
+    up = f"begins on the way up between {values[last]:g} and {values[last + 1]:g}"
+    down = f"ends on the way down between {values[first]:g} and {values[first - 1]:g}"
+    where = f"along friction.coefficient the vibration {up}, and {down}"
+    assert report.findings.sentences == [f"hysteresis at {sum(loop)} of 6 points: {where}"]
 
 
 def test_amplitudes_that_are_still_on_their_way_are_no_hysteresis(tmp_path: Path) -> None:

@@ -278,6 +278,7 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
     left = [each["squeal_probability"] for each in told["advice"]]
     assert left == sorted(left)
     assert max(left) < float(own)
+    assert told["check"]["parameter"] == told["advice"][0]["parameter"]
     for each in told["advice"]:
         settings = {each["parameter"]: float(f"{each['to']:.4g}")}
         if each["parameter"] == "link2.angle_deg":
@@ -289,6 +290,29 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
     shown = command("advise", "shoe.toml", "--scatter", "study.toml", cwd=tmp_path).out
     assert "squeal under scatter" in shown
     assert "in place of" in shown
+
+
+def test_a_drawing_beside_all_samples_is_named(tmp_path: Path) -> None:
+    """A normal distribution keeps 99.73 % within three deviations: 3.5 to 6.5 degrees."""
+    write_study(tmp_path, FRICTION, ANGLE, "samples = 16")
+    for value, said in (
+        ("6.49", ""),
+        ("6.51", "link2.angle_deg: the case has 6.51, but scatters between 3.5 and 6.5"),
+    ):
+        line = [
+            "study.toml",
+            "--set",
+            f"link2.angle_deg={value}",
+            "--set",
+            'indices_of="none"',
+            "--force",
+            "--json",
+        ]
+        notes = json.loads(command("scatter", *line, cwd=tmp_path).out)["notes"]
+        assert notes == ([said] if said else [])
+        line = ["shoe.toml", "--set", f"link2.angle_deg={value}", "--scatter", "study.toml", "--keys", "shoe.mass"]
+        assert (said in command("advise", *line, cwd=tmp_path).err) is True
+        assert ("scatters between" in command("advise", *line, cwd=tmp_path).err) is bool(said)
 
 
 def test_with_correlations_there_are_no_indices(tmp_path: Path) -> None:

@@ -1,6 +1,7 @@
 """Sweeps from their files to their results: every point as its own run gives it."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -11,9 +12,9 @@ from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.sweeps.driver import TaskQueue
-from brakecli.sweeps.plan import LoadedSweep, parse_sweep, plan_of
+from brakecli.sweeps.plan import LoadedSweep, Plan, parse_sweep, plan_of
 from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
-from brakecli.sweeps.result import SweepReport
+from brakecli.sweeps.result import SweepReport, _hysteresis
 from brakecli.sweeps.workers.task import Task, compute_units
 from tests.commands import TINY, attributes, brakecli, left_in
 from tests.sweeps.helpers import inline
@@ -260,10 +261,36 @@ output.sample_interval = 1e-4
     assert list(up.regime.values[:3]) == ["damped"] * 3
     assert list(down.regime.values[1:]) == ["relaxation"] * 3
     assert list(found.hysteresis.values[1:3]) == [1, 1]
+    loop = "begins on the way up between 2 and 3.4, and ends on the way down between 1 and 0.2"
     assert (
-        "hysteresis at 2 of 4 points: friction.coefficient = 1; friction.coefficient = 2"
-        in report.findings.sentences[0]
+        report.findings.sentences[0]
+        == f"hysteresis at 2 of 4 points: along friction.coefficient the vibration {loop}"
     )
+
+
+@pytest.mark.parametrize(
+    ("up", "down", "words"),
+    [
+        ("ddqq", "dqqq", "ends on the way up between 2 and 3, and begins on the way down between 4 and 3"),
+        ("qddd", "qqdd", "begins on the way up between 3 and 4, and ends on the way down between 3 and 2"),
+        ("dqdd", "dqqd", "friction.coefficient = 2"),
+        ("ddqq", "dqrq", "friction.coefficient = 3; friction.coefficient = 2"),
+        ("uddq", "ddqq", "friction.coefficient = 2"),
+    ],
+)
+def test_both_ends_of_a_loop_are_named_where_there_is_one_of_each(up: str, down: str, words: str) -> None:
+    """Letters stand for the regimes at 4, 3, 2, 1, the order of the file; both ways have the same amplitude."""
+    sweep = """case = "-"
+axis = [{ parameter = "friction.coefficient", values = [4, 3, 2, 1], direction = "both" }]"""
+    regimes = {each[:1]: each.encode() for each in ("damped", "quasi-harmonic", "relaxation", "undecided")}
+    columns = {
+        "regime": np.array([[regimes[each] for each in way] for way in (up, down)]),
+        "status": np.full((2, 4), Status.DONE.encode()),
+        "amplitude": np.ones((2, 4)),
+        "settled": np.ones((2, 4)),
+    }
+    journal: Any = SimpleNamespace(plan=Plan(sweep, GROWING), column=columns.__getitem__)
+    assert words in _hysteresis(journal)[1][0]
 
 
 def test_no_hysteresis_is_said_of_points_alone_that_are_decided(tmp_path: Path) -> None:
@@ -276,10 +303,10 @@ def test_no_hysteresis_is_said_of_points_alone_that_are_decided(tmp_path: Path) 
         sentences.append("; ".join(found.sentences))
     decided, some, none = sentences
     assert decided == "no hysteresis: damped on the way up and on the way down"
-    assert "no hysteresis at the 1 points that are decided: damped" in some
-    assert "hysteresis is not known at 1 points" in some
+    assert "no hysteresis at the 1 point that is decided: damped" in some
+    assert "hysteresis is not known at 1 point, which failed, is undecided" in some
     assert "no hysteresis" not in none
-    assert "hysteresis is not known at 2 points" in none
+    assert "hysteresis is not known at 2 points, which failed, are undecided" in none
 
 
 def test_the_summary_and_the_json_carry_the_names_of_the_file(tmp_path: Path) -> None:

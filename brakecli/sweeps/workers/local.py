@@ -110,9 +110,7 @@ class LocalEngine(Engine):
             return
         self._lost += 1
         if self._lost > self.workers + 1:
-            remedy = (
-                'see above what ends them; from a script call with jobs=1, or below  if __name__ == "__main__":'
-            )
+            remedy = "see above what ends them; they run the script anew that calls brakecli, but not with jobs=1"
             raise UsageError(f"no worker starts: {_cause_of_death(code)}, {self._lost} times; {remedy}")
 
     def _remove(self, worker: Worker) -> None:
