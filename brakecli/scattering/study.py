@@ -126,14 +126,14 @@ class Parameter(Table):
         within = first + parts * (last - first)
         return np.asarray(law.isf(within) if above else law.ppf(within), np.float64)
 
-    def beside(self, own: float) -> str:
+    def beside(self, path: str, own: float) -> str:
         """What is said of a drawing whose own value lies where next to none of the samples do; empty elsewhere."""
         law = self._law[0]
         low = float(law.ppf(_RARE)) if self.low is None else self.low
         high = float(law.isf(_RARE)) if self.high is None else self.high
         if low <= own <= high:
             return ""
-        return f"{self.paths[0]}: the case has {own:.4g}, but scatters between {low:.4g} and {high:.4g}"
+        return f"{path}: the case has {own:.4g}, but the study scatters it between {low:.4g} and {high:.4g}"
 
 
 _Row = Annotated[tuple[Number, ...], *from_list]
@@ -217,8 +217,8 @@ class LoadedStudy:
     def beside(self, case: Case) -> list[str]:
         """Sentences on values of a drawing that lie beside all samples."""
         own = numbers(case)
-        found = ((each, own.get(key_path(path))) for each in self.study.parameter for path in each.paths[:1])
-        said = (each.beside(value) for each, value in found if isinstance(value, float))
+        found = ((each, path, own.get(key_path(path))) for each in self.study.parameter for path in each.paths)
+        said = (each.beside(path, value) for each, path, value in found if isinstance(value, float))
         return [each for each in said if each]
 
     @property

@@ -297,7 +297,7 @@ def test_a_drawing_beside_all_samples_is_named(tmp_path: Path) -> None:
     write_study(tmp_path, FRICTION, ANGLE, "samples = 16")
     for value, said in (
         ("6.49", ""),
-        ("6.51", "link2.angle_deg: the case has 6.51, but scatters between 3.5 and 6.5"),
+        ("6.51", "link2.angle_deg: the case has 6.51, but the study scatters it between 3.5 and 6.5"),
     ):
         line = [
             "study.toml",
@@ -312,7 +312,7 @@ def test_a_drawing_beside_all_samples_is_named(tmp_path: Path) -> None:
         assert notes == ([said] if said else [])
         line = ["shoe.toml", "--set", f"link2.angle_deg={value}", "--scatter", "study.toml", "--keys", "shoe.mass"]
         assert (said in command("advise", *line, cwd=tmp_path).err) is True
-        assert ("scatters between" in command("advise", *line, cwd=tmp_path).err) is bool(said)
+        assert ("scatters it between" in command("advise", *line, cwd=tmp_path).err) is bool(said)
 
 
 def test_with_correlations_there_are_no_indices(tmp_path: Path) -> None:
