@@ -560,7 +560,7 @@ HELD = (
 INFO = (
     Field("file", "", "the file", TEXT, at="path"),
     *named(RUN, "status"),
-    Field("kind", "", "run, sweep, comparison or stability", TEXT),
+    Field("kind", "", "run, sweep, comparison, stability, branch or scatter", TEXT),
     Field("title", "", "title of the case or of the sweep", TEXT),
     Field("whole", "", "whether every byte is as it was written; false where no digest vouches for that", "?"),
     integer("bytes", "size of the file"),

@@ -20,7 +20,7 @@ from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
-from brakecli.runs.run import asked, motion_of, verdict_in_memory
+from brakecli.runs.run import asked, judged_in_memory
 from brakecli.runs.settled import Judged, settled
 from brakecli.solver.motion import Counted, Motion
 from brakecli.solver.system import System
@@ -232,8 +232,7 @@ def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
     start = time.perf_counter()
 
     def run(part: System) -> Judged[Motion]:
-        motion, certificate = motion_of(part, lambda done: progress("steps of the check", done, part.steps))
-        return Judged(verdict_in_memory(motion, part), motion, certificate)
+        return judged_in_memory(part, lambda done: progress("steps of the check", done, part.steps))
 
     ended = settled(asked(system), run)
     spent, duration = time.perf_counter() - start, ended.system.sampled_duration

@@ -101,12 +101,9 @@ def run(
                 total = part.samples if part.method.step is None else part.steps
                 return lambda done: progress(counted, done, total)
 
-            def held(part: System) -> Judged[Motion]:
-                motion, certificate = motion_of(part, shown_by(part))
-                return Judged(verdict_in_memory(motion, part), motion, certificate)
-
             if system.settles:
-                (known, motion, certificate), system, doubts = settled(system, held)
+                ended = settled(system, lambda part: judged_in_memory(part, shown_by(part)))
+                (known, motion, certificate), system, doubts = ended
                 found = check(system)
                 found = replace(found, warnings=(*found.warnings, *doubts))
                 loaded = with_duration(loaded, system.duration)
@@ -170,6 +167,12 @@ def verdict_in_memory(
     history = array_history(system.interval, motion.rows)
     failure, known = motion.work.failure_sentence, (motion.exponent, motion.track)
     return verdict_on(history, system, failure, *known, thresholds, theory=theory, in_full=in_full)
+
+
+def judged_in_memory(system: System, progress: Progress) -> Judged[Motion]:
+    """The motion of a system, in memory, with its verdict and its certificate."""
+    motion, certificate = motion_of(system, progress)
+    return Judged(verdict_in_memory(motion, system), motion, certificate)
 
 
 def _refuse_overflow(rows: NDArray[np.float64]) -> None:
