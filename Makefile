@@ -18,12 +18,13 @@ PYTEST := -m pytest --numprocesses 3 --dist loadfile
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 POINTS ?=
+BEFORE ?= HEAD
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .NOTPARALLEL: # two installations into one .venv at a time would collide
 .PHONY: help demo test campaign lowest lint format types imports derivations tables docs cases check \
-    accuracy promises promise-cost statistics picture lock-in branch-picture scatter-picture loop-picture basin-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch clean
+    accuracy promises promise-cost statistics picture lock-in branch-picture scatter-picture loop-picture basin-picture regime-pictures paper extremes bench bench-sweep bench-million bench-contact bench-branch fingerprint size words clean
 
 help: ## list the targets (this text)
 	@echo "make TARGET, where TARGET is one of"
@@ -200,6 +201,15 @@ bench-contact: $(DEV_STAMP) ## what the contact costs, against C; needs gcc and 
 
 bench-branch: $(DEV_STAMP) ## what branches of 200 random shoes cost, and how many get through; needs an idle core (a minute)
 	$(BIN)/python -m benchmarks.branches
+
+fingerprint: $(DEV_STAMP) ## compare all numbers of the working tree with those of a commit, BEFORE=v0.7.0 (some minutes)
+	$(BIN)/python -m benchmarks.fingerprint $(BEFORE)
+
+size: $(DEV_STAMP) ## count statements of the package, and what is longer than the house allows
+	$(BIN)/python -m benchmarks.size
+
+words: $(DEV_STAMP) ## count the words of the documentation outside code and tables
+	$(BIN)/python -m benchmarks.words
 
 extremes: $(DEV_STAMP) ## compute the extremes of all inputs and write docs/extremes.md (a minute)
 	$(BIN)/python -m benchmarks.extremes
