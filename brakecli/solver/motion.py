@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from numba import float64, int64, void
@@ -35,6 +35,7 @@ from brakecli.solver.records import (
 )
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at
+from brakecli.solver.schemes import OwnStepsModule, SteppingModule
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponent, seed
@@ -293,8 +294,9 @@ def _plugged_in(system: System) -> Plug:
     """What the loop calls: the kernels of the scheme and the iteration of a step."""
     scheme = system.scheme
     if system.method.own_steps:
-        return Plug(0, 0, 0 if system.method.row.exact else address(scheme.solve))
+        return Plug(0, 0, 0 if system.method.row.exact else address(cast(OwnStepsModule, scheme).solve))
     from brakecli.solver import implicit_step  # its kernels are compiled only where they are needed
 
     solve = implicit_step.newton if system.method.iteration == "newton" else implicit_step.fixed_point
-    return Plug(address(scheme.prepare), address(scheme.finish), address(solve))
+    stepping = cast(SteppingModule, scheme)
+    return Plug(address(stepping.prepare), address(stepping.finish), address(solve))

@@ -7,7 +7,8 @@ from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Pair, Plant, Weights
 
 LAG = 0
-MEMORY, VELOCITIES = ("x", "y", "v_x", "v_y"), ("v_x", "v_y")
+MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
+VELOCITIES: tuple[str, ...] = ("v_x", "v_y")
 mechanical_energy = energy_at_level
 
 

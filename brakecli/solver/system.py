@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -131,7 +130,7 @@ class System:
         return contact.load(self.evaluator)
 
     @property
-    def scheme(self) -> ModuleType:
+    def scheme(self) -> schemes.SchemeModule:
         """The scheme's module; its kernels are compiled on the first call of a new version."""
         return schemes.load(self.method.scheme)
 

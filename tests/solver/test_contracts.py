@@ -2,6 +2,7 @@
 
 import pkgutil
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,14 @@ from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema
 from brakecli.errors import CaseError
 from brakecli.solver import contact, schemes
+from brakecli.solver.contact import auto, closed_form, exact, midpoint
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.implicit_step import SOLVED, newton
 from brakecli.solver.loop import advance
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
+from brakecli.solver.schemes import event_driven, piecewise_exact, three_layer, two_layer
+from tests.solver import small_scheme
 from tests.solver.rough_gap import outputs, unfilled
 
 EVALUATORS = sorted(module.name for module in pkgutil.iter_modules(contact.__path__) if module.name != "pad")
@@ -118,6 +122,44 @@ def test_an_evaluator_is_accepted_by_the_step(name: str) -> None:
 # --- schemes -------------------------------------------------------------------------------------------------
 
 COEFFICIENTS = Coefficients(10.0, 300.0, -20.0, 200.0, 2e7, -1e6, 1e7, 0.0, 1.0, 0.3)
+
+
+CONTRACTS: dict[str, tuple[schemes.SchemeModule, bool, bool]] = {  # mypy holds modules to the signatures
+    "two_layer": (two_layer, True, False),
+    "three_layer": (three_layer, True, False),
+    "event_driven": (event_driven, False, True),
+    "piecewise_exact": (piecewise_exact, False, False),
+}
+STEPS: list[schemes.SteppingModule] = [two_layer, three_layer, small_scheme]
+OWN_STEPS: list[schemes.OwnStepsModule] = [event_driven]
+CONTACTS: dict[str, contact.EvaluatorModule] = {
+    "auto": auto,
+    "closed_form": closed_form,
+    "exact": exact,
+    "midpoint": midpoint,
+}
+
+
+@pytest.mark.parametrize("name", SCHEMES)
+def test_a_scheme_keeps_the_contract_of_its_kind(name: str) -> None:
+    module, steps, own_steps = CONTRACTS[name]
+    assert schemes.load(name.replace("_", "-")) is module
+    assert isinstance(module, schemes.SchemeModule)
+    assert isinstance(module, schemes.SteppingModule) is steps is (name in STEPPING)
+    assert isinstance(module, schemes.OwnStepsModule) is own_steps
+
+
+@pytest.mark.parametrize("missing", ["LAG", "VELOCITIES", "begin", "advance", "prepare", "finish"])
+def test_a_scheme_that_lacks_a_part_is_no_scheme(missing: str) -> None:
+    parts = {name: value for name, value in vars(small_scheme).items() if name != missing}
+    assert isinstance(SimpleNamespace(**vars(small_scheme), __hash__=hash), schemes.SteppingModule)
+    assert not isinstance(SimpleNamespace(**parts, __hash__=hash), schemes.SteppingModule)
+
+
+def test_every_evaluator_keeps_its_contract() -> None:
+    assert {*CONTACTS} == {*EVALUATORS}
+    assert all(isinstance(module, contact.EvaluatorModule) for module in CONTACTS.values())
+    assert not isinstance(SimpleNamespace(press=exact.evaluate), contact.EvaluatorModule)
 
 
 @pytest.mark.parametrize("name", SCHEMES)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.method import MOST, Method
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
+from brakecli.solver.schemes import SteppingModule
 from brakecli.solver.system import System
 
 RESOLVED = 20  # steps per period, and per passing wave, below which a warning names the number
@@ -33,7 +34,8 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
     """
     if system.method.own_steps:
         return StepLimits(contraction=0.0, unique=True, growth=1.0)
-    c, scheme, contact_stiffness = system.coefficients, system.scheme, system.contact_stiffness
+    scheme = cast(SteppingModule, system.scheme)
+    c, contact_stiffness = system.coefficients, system.contact_stiffness
     s, problem = system.weights if step is None else system.weights._replace(h=step), new(PROBLEM)
     scheme.prepare(c, s, new(scheme.STATE), problem)
     a_11, a_12, a_22, gain = (float(each) for each in (problem.a_11, problem.a_12, problem.a_22, problem.gain))

@@ -2,20 +2,35 @@
 
 The rows are plain data; a file is imported when it is used.
 
-Contract of an evaluator module: `evaluate(x, y, layer)`, a kernel of the signature `records.EVALUATE`, fills
-`layer.contact`, a record of `records.CONTACT`, for the shoe at (x, y) and the phases `layer.angles` of the wheel's
-harmonics (`roughness.turn`). On nodes it takes heights from `heights.profiles`: with a window there are no phases.
-It takes constants and tables from `layer.pad` and `layer.tables`, changes nothing but the contact and
-`layer.scratch`, and notes its place in `kinds()`. With `near` and `blur` it says how far F_y can be from linear
-nearby, which may save an evaluation; both may be left as they are. What it keeps in the scratch may save work,
-and change results by rounding alone. A kernel `press` of the same signature may find normal force, stiffness,
-fraction, kind and validity alone, for event-driven runs. One whose work is small begins with
-`layer = borrowed(layer)`: reference counts would cost a third of a step.
+A module keeps the contract `EvaluatorModule`.
 """
 
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
+
+if TYPE_CHECKING:
+    from brakecli.solver.records import Layer
+
+
+@runtime_checkable
+class EvaluatorModule(Protocol):
+    """What every evaluator has.
+
+    It may also have a kernel `press` of the same signature, which finds normal force, stiffness, fraction, kind
+    and validity alone, for event-driven runs.
+    """
+
+    def evaluate(self, x: float, y: float, layer: "Layer", /) -> None:
+        """Fill `layer.contact` for the shoe at (x, y): a kernel of the signature `records.EVALUATE`.
+
+        The phases of the wheel's harmonics are in `layer.angles` (`roughness.turn`); on nodes heights come from
+        `heights.profiles`, and with a window there are no phases. Constants and tables are in `layer.pad` and
+        `layer.tables`. It changes nothing but the contact and `layer.scratch`, and notes its place in `kinds()`.
+        `near` and `blur` say how far F_y can be from linear nearby, which may save an evaluation; both may be
+        left. What it keeps in the scratch may save work, and change results by rounding alone. Where its work is
+        small it begins with `layer = borrowed(layer)`: reference counts would cost a third of a step.
+        """
 
 
 @dataclass(frozen=True)
@@ -53,7 +68,7 @@ def load(name: str) -> Any:
     """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
-    return import_module(EVALUATORS[name].module).evaluate
+    return cast(EvaluatorModule, import_module(EVALUATORS[name].module)).evaluate
 
 
 def load_press(name: str) -> Any:

@@ -1,27 +1,78 @@
 """Schemes: one file and one row of `SCHEMES` each. The rows are plain data; a file is imported when it is used.
 
-Contract of every scheme module:
-
-- `STATE`: the type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force;
-- `LAG`: how many levels the known velocity lies behind the position;
-- `MEMORY`: the fields of the state that decide the next ones, `VELOCITIES`: which of them are velocities;
-- `weighted_time(weights)`: the time at which a step evaluates the load, the travel of the wheel and the contact,
-  in steps after the current level;
-- `order(weights, start)`: its order of accuracy on smooth motion;
-- `begin(...)`: fills the state from which the loop starts, at level `LAG`;
-- `mechanical_energy(...)`: kinetic energy and energy of the links that the scheme keeps, also of states in arrays;
-- `hold` and `advance`, kernels, and `sample`: those of `solver.loop`, or its own, with the same arguments, where
-  its steps are its own, held to a tolerance, on the grid of samples alone, or exact, on a grid between them;
-- in the first case kernels `prepare` and `finish`, of the signatures in `solver.records`: the minimisation that a
-  step comes down to, and the new state with the works of the step; where steps are its own and not exact `solve`,
-  the kernel of one step, which `advance` calls at the address in `plug.solve`.
+A module keeps one of the contracts below: `SteppingModule` where its steps are those of `solver.loop`, all of one
+length; `OwnStepsModule` where it finds its steps itself, held to a tolerance; `SchemeModule` where it is exact.
 """
 
 from dataclasses import dataclass
 from importlib import import_module
-from types import ModuleType
+from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
+
+if TYPE_CHECKING:
+    from brakecli.solver.compile import Floats
+    from brakecli.solver.energy import Mechanical
+    from brakecli.solver.records import Coefficients, Pair, Plant, Weights
 
 HALF, QUARTERS, NUMEROV = (0.5, 0.5), (0.25, 0.5, 0.25), (1 / 12, 10 / 12, 1 / 12)
+
+
+@runtime_checkable
+class SchemeModule(Protocol):
+    """What every scheme has."""
+
+    STATE: Any
+    """Type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force."""
+    LAG: int
+    """How many levels the known velocity lies behind the position."""
+    MEMORY: tuple[str, ...]
+    """The fields of the state that decide the next ones."""
+    VELOCITIES: tuple[str, ...]
+    """Those of them that are velocities."""
+
+    def __hash__(self) -> int:
+        """Modules are told apart, as by caches."""
+
+    def weighted_time(self, s: "Weights", /) -> float:
+        """Time at which a step evaluates load, travel and contact, in steps after the current level."""
+
+    def order(self, s: "Weights", start: str, /) -> int:
+        """Order of accuracy on smooth motion."""
+
+    def begin(self, s: "Weights", state: Any, position: "Pair", velocity: "Pair", acceleration: "Pair", /) -> None:
+        """Fill the state from which the loop starts, at level `LAG`."""
+
+    def mechanical_energy(self, c: "Coefficients", s: "Weights", state: Any, /) -> "Mechanical":
+        """Kinetic energy and energy of the links that the scheme keeps, also of states in arrays."""
+
+    def hold(self, plant: "Plant", address: int, /) -> None:
+        """Put all that a run needs at an address, where `advance` finds it: a kernel."""
+
+    def advance(self, address: int, rows: "Floats", events: "Floats", stop: int, /) -> int:
+        """Step to the level `stop`, fill rows with the samples before each step; a `Failure`: a kernel."""
+
+    def sample(self, plant: "Plant", row: "Floats", /) -> None:
+        """Write the sample that is due."""
+
+
+@runtime_checkable
+class SteppingModule(SchemeModule, Protocol):
+    """What a scheme has besides whose steps are of one length; it takes `advance` and `sample` from the loop."""
+
+    def prepare(self, c: "Coefficients", s: "Weights", state: Any, problem: Any, /) -> None:
+        """The minimisation that a step comes down to: a kernel of the signature `records.PREPARE`."""
+
+    def finish(
+        self, c: "Coefficients", s: "Weights", state: Any, problem: Any, contact: Any, work: Any, /
+    ) -> None:
+        """The new state, and the works of the step: a kernel of the signature `records.FINISH`."""
+
+
+@runtime_checkable
+class OwnStepsModule(SchemeModule, Protocol):
+    """What a scheme has besides that finds its steps itself. Its samples lie on the grid alone."""
+
+    solve: Any
+    """The kernel of one step, which `advance` calls at the address in `plug.solve`."""
 
 
 @dataclass(frozen=True)
@@ -93,6 +144,6 @@ SCHEMES: dict[str, Scheme] = {
 }
 
 
-def load(name: str) -> ModuleType:
+def load(name: str) -> SchemeModule:
     """The module of a scheme; its kernels are compiled on the first call of a new version."""
-    return import_module(SCHEMES[name].module)
+    return cast(SchemeModule, import_module(SCHEMES[name].module))

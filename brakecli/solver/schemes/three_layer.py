@@ -10,7 +10,7 @@ from brakecli.solver.records import Coefficients, Pair, Weights
 STATE = records.STATE
 hold, advance, sample = loop.hold, loop.advance, loop.sample
 LAG = 1
-MEMORY = ("x", "y", "x_old", "y_old")
+MEMORY: tuple[str, ...] = ("x", "y", "x_old", "y_old")
 VELOCITIES: tuple[str, ...] = ()
 
 

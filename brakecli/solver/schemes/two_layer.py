@@ -10,8 +10,8 @@ from brakecli.solver.records import Coefficients, Pair, Weights
 STATE = records.STATE
 hold, advance, sample = loop.hold, loop.advance, loop.sample
 LAG = 0
-MEMORY = ("x", "y", "v_x", "v_y")
-VELOCITIES = ("v_x", "v_y")
+MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
+VELOCITIES: tuple[str, ...] = ("v_x", "v_y")
 mechanical_energy = energy_at_level  # what the scheme keeps belongs to the level reached
 
 
