@@ -34,7 +34,7 @@ GROWN = 2.0
 """Change of size after which a new chart is taken."""
 SHIFT = 1e-6
 """Length along the branch by which a point is moved to carry its direction to another chart."""
-PERIODS = 1e-3, 400.0
+SHORTEST, LONGEST = 1e-3, 400.0
 """Periods of a chart between which a period is sought."""
 
 
@@ -114,7 +114,7 @@ class Cycles(Problem):
     def _flown(self, u: Array, p: float, chart: Chart, derivative: bool = True) -> Flow | str:
         """The flow over the period that is sought, or why there is none."""
         periods = u[4]
-        if not PERIODS[0] < periods < PERIODS[1]:
+        if not SHORTEST < periods < LONGEST:
             return "the period vanishes, or grows without bound"
         try:
             flow, rest = self.flow(p), self.rest(p)

@@ -23,7 +23,7 @@ PLACES = 9
 """Places of the range at which the cells are counted that are enough."""
 STEPS = 80.0
 """Steps to the fastest period: a period is short, and the pad lifts off and lands in few of them."""
-KEPT = 0.6, 1.6
+SHORTER, LONGER = 0.6, 1.6
 """Periods of a chart between which its number of steps fits."""
 INSTANT = 1e-12
 """Part of the fastest period after which the velocity of the begin is read."""
@@ -141,7 +141,7 @@ class RoughCycles(Cycles):
         return flow.over(state, periods * chart.time, flow.steps(chart.time), derivative)
 
     def _fits(self, periods: float) -> bool:
-        return KEPT[0] < periods < KEPT[1]
+        return SHORTER < periods < LONGER
 
     def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
         if len(word) > 1 or word[0] == STICK:

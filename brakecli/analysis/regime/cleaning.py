@@ -11,7 +11,8 @@ from brakecli.analysis.spectrum import Array
 
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
-_SPIKES = (8.0, 0.35)  # deviations, and part of the signal's range, by which a spike leaves its neighbours' median
+_SPIKE_DEVIATIONS = 8.0  # by which a spike leaves the median of its neighbours
+_SPIKE_RANGE = 0.35  # part of the signal's range by which it does so, too
 _NOISE_SHARE = 0.6  # most of the variance that noise may be where slips are sought
 _SLOWEST = 60  # parts of the record over which is smoothed at most
 _MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
@@ -181,7 +182,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     away = values - median_filter(values, 5, mode="nearest")
     low, high = np.quantile(values, [0.1, 0.9])
     deviation = 1.4826 * float(np.median(np.abs(away)))
-    spikes = np.abs(away) > max(_SPIKES[0] * deviation, _SPIKES[1] * float(high - low))
+    spikes = np.abs(away) > max(_SPIKE_DEVIATIONS * deviation, _SPIKE_RANGE * float(high - low))
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
     spikes &= np.abs(away) > 3.0 * beside
     count = int(np.sum(spikes))

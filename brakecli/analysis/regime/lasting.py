@@ -25,7 +25,8 @@ _WIDER = 1.02  # times as far as in the last half of them, a transient swings
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _DRIFT = 5e-3  # by which amplitude or frequency of a settled limit cycle may change
 _SHIFTED = 0.5  # of itself, by which impacts may shift a cycle: beyond, its frequency is not known
-_KICKED = 0.5, 0.1  # of its shift by impacts: most that the amplitude and the frequency of a cycle were off
+_IMPACT_AMPLITUDE_ERROR = 0.5  # largest error of a cycle's amplitude, as a part of its shift by impacts
+_IMPACT_FREQUENCY_ERROR = 0.1  # and of its frequency
 _MODULATES = 0.1  # of a vibration, beside which waves count: smaller ones change its cycles, too
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line is the frequency
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
@@ -232,7 +233,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     if shift >= _SHIFTED:
         step = shown.context.step * math.sqrt(0.3 * _SHIFTED / shift)
         text = f"this vibration settles at only {rate:.2g} 1/s, and impacts of so few steps may shift it by"
-        text = f"{text} {_KICKED[0] * shift:.0%}: take a solver.step of {step:.2g} s, or a solver.tolerance"
+        text = f"{text} {_IMPACT_AMPLITUDE_ERROR * shift:.0%}: take a solver.step of {step:.2g} s, or a solver.tolerance"
     elif not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
     elif not answers.waves and far:
@@ -254,7 +255,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
 
     wander = cycles.evidence["frequency_spread"]
     spread = held(wander, cycles.frequency, cycles.detuning)
-    more = cycles.frequency_off + _KICKED[1] * shift * cycles.frequency
+    more = cycles.frequency_off + _IMPACT_FREQUENCY_ERROR * shift * cycles.frequency
     found.evidence["frequency_spread"] = min((wander if spread is None else spread) + more, cycles.frequency)
     found.frequency = cycles.frequency
     if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
@@ -266,7 +267,9 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     short = seconds < shown.slowest(0.0) or abs(answers.change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends
         found.spread = held(
-            cycles.amplitude_spread + _KICKED[0] * shift * cycles.amplitude, cycles.amplitude, cycles.drift
+            cycles.amplitude_spread + _IMPACT_AMPLITUDE_ERROR * shift * cycles.amplitude,
+            cycles.amplitude,
+            cycles.drift,
         )
         if far and not answers.waves and found.spread is not None and math.isfinite(off):
             found.spread += off

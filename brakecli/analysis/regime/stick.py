@@ -27,7 +27,8 @@ _SWINGS = 0.6  # most that goes the other way
 _AROUND = 5  # widths of a slip in which it would swing
 _NARROW = 2  # samples of a pulse of velocity that may be a spike
 _REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
-_LOADED = (0.4, 2.5)  # correlation of slips with the time before or after them, and that times √n
+_LOADED_LEAST = 0.4  # least correlation of slips with the times that have loaded them
+_LOADED_BY_CHANCE = 2.5  # over √n: a correlation of n pairs that chance does not reach
 
 
 @dataclass(frozen=True)
@@ -165,4 +166,4 @@ def _loaded(values: Array, starts: NDArray[np.intp], depths: Array, scale: int) 
     if width > _NARROW or last - first < _REGULAR * median:
         return True
     along = np.corrcoef([depths[1:], depths[:-1], waits])[2, :2]
-    return bool(np.nanmax(along) >= max(_LOADED[0], _LOADED[1] / np.sqrt(len(waits))))
+    return bool(np.nanmax(along) >= max(_LOADED_LEAST, _LOADED_BY_CHANCE / np.sqrt(len(waits))))
