@@ -233,7 +233,8 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     if shift >= _SHIFTED:
         step = shown.context.step * math.sqrt(0.3 * _SHIFTED / shift)
         text = f"this vibration settles at only {rate:.2g} 1/s, and impacts of so few steps may shift it by"
-        text = f"{text} {_IMPACT_AMPLITUDE_ERROR * shift:.0%}: take a solver.step of {step:.2g} s, or a solver.tolerance"
+        text += f" {_IMPACT_AMPLITUDE_ERROR * shift:.0%}"
+        text += f": take a solver.step of {step:.2g} s, or a solver.tolerance"
     elif not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
     elif not answers.waves and far:
