@@ -42,7 +42,7 @@ $(BIN)/python:
 
 # The installation is editable: it always runs the code that is here. It is renewed when the dependencies, the version
 # or the Python have changed.
-INSTALLED_FROM := pyproject.toml brakecli/__init__.py $(BIN)/python
+INSTALLED_FROM := pyproject.toml brakecli/about.py $(BIN)/python
 
 $(RUN_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli into $(VENV) ..."

@@ -12,7 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from brakecli.cli.inputs import load_sweep
+from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.point import compute

@@ -5,7 +5,7 @@ import gc
 import os
 import sys
 
-from brakecli import fix_environment
+from brakecli.about import fix_environment
 
 if os.name == "nt":  # before anything is imported that Windows lacks
     sys.stderr.write("brakecli: does not run on Windows itself; use its Subsystem for Linux (WSL)\n")

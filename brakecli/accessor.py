@@ -18,14 +18,14 @@ from brakecli.analysis.probability import Probability
 from brakecli.analysis.regime.bursts import Burst
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete
-from brakecli.cli.file_tables import diff_table
-from brakecli.cli.stability_tables import advice_table
-from brakecli.cli.tables import Row, text_of, two_columns, verdict_table
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.as_xarray import stored
 from brakecli.files.contents import Difference
 from brakecli.files.field import Field, values_of
+from brakecli.front.file_tables import diff_table
+from brakecli.front.stability_tables import advice_table
+from brakecli.front.tables import Row, text_of, two_columns, verdict_table
 from brakecli.runs.advise import AdviceReport
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.sweeps.attractors import Attractor

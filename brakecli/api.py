@@ -17,7 +17,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from brakecli.errors import BrakecliError, UnreadableResultError, UsageError, in_python
+from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
+from brakecli.faces import in_python
 from brakecli.files.os_signals import Interrupted, unwinding
 from brakecli.files.trust import readings
 from brakecli.stop import signals_shown
@@ -28,7 +29,7 @@ if TYPE_CHECKING:
 
     from brakecli.accessor import Advice, Differences
     from brakecli.case.read import LoadedCase
-    from brakecli.cli.measured import Measured
+    from brakecli.front.measured import Measured
     from brakecli.solver.motion import Counted
     from brakecli.sweeps.listed import Listed
     from brakecli.sweeps.plan import LoadedSweep
@@ -52,7 +53,7 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, f
         CaseError: the case or a setting is wrong; holds every problem.
         UnreadableResultError: the result is damaged or of another program.
     """
-    from brakecli.cli.inputs import is_result, is_sweep, load_case, load_sweep
+    from brakecli.front.inputs import is_result, is_sweep, load_case, load_sweep
 
     name = str(source)
     with in_python(), _readings(force_read=force_read):
@@ -201,7 +202,7 @@ def branch(
         [(names, ends)] = parameter.items()
         low, high = _ends(ends)
         text = f"{names if isinstance(names, str) else ','.join(names)}={low!r}:{high!r}"
-        keys, low, high = parsed(text, "parameter")
+        keys, low, high = parsed(text)
         with within_range():
             line = line_of(loaded, keys, low, high, "parameter")
         given: Iterable[Any] = start if isinstance(start, list | tuple) else [start] if start is not None else []
@@ -262,10 +263,10 @@ def sweep(
     """
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
-        from brakecli.cli.inputs import load_sweep
         from brakecli.files import fields
         from brakecli.files.as_xarray import opened
         from brakecli.files.field import values_of
+        from brakecli.front.inputs import load_sweep
         from brakecli.runs.run import load_kernels
         from brakecli.sweeps.driver import choose_engine, counting, sweep
         from brakecli.sweeps.listed import GIVEN
@@ -350,8 +351,8 @@ def scatter(
     """
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
-        from brakecli.cli.inputs import load_study
         from brakecli.files.as_xarray import opened
+        from brakecli.front.inputs import load_study
         from brakecli.scattering.scatter import engine_for, scatter
 
         loaded = load_study(str(source), _overrides(settings))
@@ -398,7 +399,7 @@ def advise(
         loaded = _case(case, settings)
         from brakecli.accessor import Advice
         from brakecli.analysis.stability.advice import KEYS
-        from brakecli.cli.inputs import load_study
+        from brakecli.front.inputs import load_study
         from brakecli.runs.advise import advise
         from brakecli.runs.limits import within_range
         from brakecli.runs.run import load_kernels
@@ -596,16 +597,16 @@ def classify(
     Raises:
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
-    from brakecli.cli.classify import Options
     from brakecli.files.as_xarray import dataset
     from brakecli.files.fields import EXPONENT, VERDICT
+    from brakecli.front.verdict import verdict_on
 
     if "second_run" in reading:
         raise UsageError("classify: second_run: there is none any more; every verdict asks what it asked")
     changes = [f"{name}={value}" for name, value in _mapping(thresholds, "thresholds").items()]
     measured = _measured("classify", quantity, belt_speed, stiffness, reading)
     with _interruptible(), _readings(force_read=force_read), _files([source], "result") as (file,):
-        numbers = Options(measured, changes).verdict(str(file))
+        numbers = verdict_on(str(file), measured, changes)
     _warn(numbers.get("warnings", ()))
     return dataset((*VERDICT, *EXPONENT), numbers)
 
@@ -614,7 +615,7 @@ def _measured(
     function: str, quantity: str | None, belt_speed: Any, stiffness: Any, reading: dict[str, Any]
 ) -> "Measured":
     """How a signal was measured, from the arguments of a function."""
-    from brakecli.cli.measured import NUMBERS, Measured
+    from brakecli.front.measured import NUMBERS, Measured
 
     how = ("column", "time_column", "sample_rate", "unit", "time_unit")
     if unknown := sorted(reading.keys() - {*how}):
@@ -663,7 +664,7 @@ def _readings(*, force_read: bool = False) -> Iterator[None]:
 @contextmanager
 def _telling(progress: "Progress") -> Iterator["Counted"]:
     """What tells the progress: a function of the caller, or that of the commands."""
-    from brakecli.cli.output import telling
+    from brakecli.front.progress import telling
 
     if callable(progress):
         yield progress
@@ -722,7 +723,7 @@ def _files(results: "Iterable[Result]", *names: str) -> Iterator[list[Path]]:
 def _case(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
     from brakecli.case.case import given_toml
     from brakecli.case.read import LoadedCase, parse_case, parse_resolved
-    from brakecli.cli.inputs import load_case
+    from brakecli.front.inputs import load_case
 
     if isinstance(source, LoadedCase):
         if settings:

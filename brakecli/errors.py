@@ -9,7 +9,7 @@ import re
 import unicodedata
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 _ODD = {"Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"}  # categories of Unicode
 KeyPath = tuple[str | int, ...]
@@ -84,49 +84,6 @@ class OtherKindError(UnreadableResultError, exit_code=4):
 
 class CannotWriteError(BrakecliError, exit_code=os.EX_IOERR):
     """An output cannot be written."""
-
-
-_ARGUMENTS = {
-    "--force": "force=True",
-    "--force-read": "force_read=True",
-    "-o": "output",
-    "--set": "setting",
-    "--threshold": "thresholds",
-}
-
-
-def _for_python(text: str) -> str:
-    """A message that names functions and their arguments instead of commands and their options."""
-
-    def argument(option: re.Match[str]) -> str:
-        return _ARGUMENTS.get(option[0], option[0].strip("-").replace("-", "_"))
-
-    text = re.sub(r"""with: brakecli (\w+) (?:'[^']*'|"[^"]*"|[^\s'"])+""", r"with: brakecli.\1", text)
-    text = text.replace('"/numpy/array ', '"array ')
-    return re.sub(r"(?<!\S)(-o|--[a-z][a-z-]*)\b", argument, text)
-
-
-@contextmanager
-def in_python() -> Iterator[None]:
-    """Turn messages for the command line into those for Python."""
-    try:
-        yield
-    except CaseError as error:
-        problems = [
-            replace(
-                each,
-                source=_for_python(each.source),
-                what=_for_python(each.what),
-                remedy=_for_python(each.remedy),
-            )
-            for each in error.problems
-        ]
-        raise CaseError(problems) from error
-    except RecursionError:
-        raise UsageError("a value lies too deep in others, or in itself; give numbers, texts and lists") from None
-    except BrakecliError as error:
-        error.args = (_for_python(str(error)),)
-        raise
 
 
 @contextmanager

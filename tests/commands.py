@@ -204,8 +204,8 @@ def _server() -> subprocess.Popen[str]:
 
 
 def _serve() -> None:
-    import brakecli.cli.tables
     import brakecli.comparison.result
+    import brakecli.front.tables
     import brakecli.sweeps.result  # noqa: F401 - these load all that a command needs
     from brakecli.__main__ import main
 

@@ -19,9 +19,9 @@ import pytest
 import xarray as xr
 
 import brakecli
-from brakecli.cli import output
-from brakecli.cli.output import telling
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
+from brakecli.front import progress
+from brakecli.front.progress import telling
 from tests.commands import QUICK, ROOT, TINY
 from tests.commands import brakecli as command
 
@@ -546,7 +546,7 @@ def test_what_a_line_has_counted_is_told_to_its_end(
 ) -> None:
     """At 25 s a line is due, the next one at 50 s; a short count within that time is not told."""
     times = iter([0.0, 25.0, 30.0, 31.0, 31.0, 32.0, 33.0])
-    monkeypatch.setattr(output, "time", SimpleNamespace(monotonic=lambda: next(times)))
+    monkeypatch.setattr(progress, "time", SimpleNamespace(monotonic=lambda: next(times)))
     with telling(quiet=False) as tell:
         for done, total in ((1, 9), (8, 9), (9, 9), (9, 9), (1, 2), (2, 2)):
             tell("points", done, total)
@@ -603,7 +603,7 @@ def test_an_array_is_called_so_where_it_does_not_fit() -> None:
     flat = np.repeat(np.linspace(0.0, 1e-3, 99), 2).reshape(-1, 2)  # heights on a straight line
     with pytest.raises(CaseError, match="straight line") as caught:
         brakecli.load(CASE, {"roughness.wheel.profile": flat})
-    assert '(found "array ' in str(caught.value)
+    assert '(found "/array ' in str(caught.value)
     assert "/numpy" not in str(caught.value)
 
 

@@ -16,7 +16,7 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.cli.inputs import load_sweep
+from brakecli.front.inputs import load_sweep
 from brakecli.solver.roughness import TWO_PI
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import kind_of

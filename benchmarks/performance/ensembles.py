@@ -18,7 +18,7 @@ from benchmarks.performance.matching import Entry, Floats
 from benchmarks.performance.problem import Problem
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.cli.inputs import load_sweep
+from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.point import compute

@@ -16,7 +16,7 @@ from benchmarks.performance import ensembles
 from benchmarks.performance.matching import Entry, cheapest, loop
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.cli.inputs import load_sweep
+from brakecli.front.inputs import load_sweep
 from brakecli.runs.tolerance import certify
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve

@@ -107,7 +107,7 @@ def given(value: object) -> str:
     require(rows.nbytes <= MOST_MEASURED, f"takes more than {MOST_MEASURED / 1e6:g} MB; measure fewer places")
     record = _checked(rows[:, 0], rows[:, 1], is_angle=False)
     digest = hashlib.sha256(record.place + record.height).hexdigest()
-    name = f"/numpy/array {digest[:12]}"  # absolute, and no path of a file
+    name = f"/array {digest[:12]}"  # absolute, and no path of a file
     arrays.get()[name] = record
     return name
 

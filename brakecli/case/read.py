@@ -20,6 +20,7 @@ from brakecli.case.case import Case, changed, resolved_toml
 from brakecli.case.roughness import Record, Records, arrays, reading
 from brakecli.case.tables import MISSING, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
+from brakecli.faces import argument
 from brakecli.files import toml_lines
 from brakecli.files.opening import SIGNATURE, opened
 from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
@@ -139,7 +140,7 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
     if isinstance(initial, dict) and isinstance(result := initial.get("from"), str) and result:
         initial["from"] = str(Path(label).parent / result)
     for override in overrides:
-        sources.append(by := f"--set {printable(override)}")
+        sources.append(by := f"{argument('set')} {printable(override)}")
         try:
             path, value = parse_override(override)
             set_by |= dict.fromkeys((*put(data, path, value, kind, kept=set_by), path), by)
@@ -198,14 +199,16 @@ def parse_override(override: str) -> tuple[tuple[str, ...], object]:
     key, _, value = override.partition("=")
     path = key_path(key)
     if "=" not in override or not path:
-        raise unfit(f"does not begin with a key (found {printable(key)})", "write --set key.path=VALUE")
+        raise unfit(
+            f"does not begin with a key (found {printable(key)})", f"write {argument('set')} key.path=VALUE"
+        )
     with suppress(CaseError):
         parsed = parse(f"value={value}")
         if parsed.keys() == {"value"}:
             return path, parsed["value"]
     remedy = WRITING
     if re.fullmatch(r"[^\W\d][\w .-]*", value):
-        remedy = f"texts need quotes: --set {key}={shlex.quote(json.dumps(value, ensure_ascii=False))}"
+        remedy = f"texts need quotes: {argument('set')} {key}={shlex.quote(json.dumps(value, ensure_ascii=False))}"
     raise unfit(f"the value is not valid TOML (found {printable(value)})", remedy)
 
 

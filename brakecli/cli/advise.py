@@ -2,9 +2,10 @@
 
 from typing import Annotated
 
-from brakecli.cli.inputs import load_case, load_study
 from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
-from brakecli.cli.output import progress, say, show_result, warn
+from brakecli.cli.output import progress, show_result, warn
+from brakecli.front.inputs import load_case, load_study
+from brakecli.front.progress import say
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
 STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study; its case is not used."
@@ -25,7 +26,7 @@ def command(
     loaded = load_case(case, overrides)
     study = load_study(scatter, None) if scatter is not None else None
     from brakecli.analysis.stability.advice import KEYS as USUAL
-    from brakecli.cli.stability_tables import advice_table
+    from brakecli.front.stability_tables import advice_table
     from brakecli.runs.advise import advise, advise_seconds
     from brakecli.runs.cost import duration_text
     from brakecli.runs.limits import WORTH_SAYING, within_range

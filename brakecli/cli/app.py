@@ -12,13 +12,14 @@ from typing import Annotated
 
 import typer
 
-from brakecli import __released__, __version__
-from brakecli.cli.inputs import as_argument
+from brakecli.about import __released__, __version__
 from brakecli.cli.options import option
-from brakecli.cli.output import announce_compilation, say, show, warn
+from brakecli.cli.output import announce_compilation, show, warn
 from brakecli.errors import BrakecliError, RefusedError
+from brakecli.faces import as_argument
 from brakecli.files.os_signals import Interrupted
 from brakecli.files.trust import readings
+from brakecli.front.progress import say
 from brakecli.solver import compiling
 
 COMMANDS = (

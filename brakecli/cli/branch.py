@@ -4,10 +4,10 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
 from brakecli.cli.output import progress, show_result
 from brakecli.files.os_signals import Interrupted, signals_deferred
+from brakecli.front.inputs import load_case, result_path
 
 PARAMETER = "Follow all motions along a key, or along several that take the same value."
 START = "Also follow the motion that the end of this run comes to; repeatable."
@@ -32,10 +32,10 @@ def command(
     keys, low, high = parsed(parameter)
     loaded = load_case(case, overrides)
     target = result_path(output, case) if output is not None else None
-    from brakecli.cli.branch_table import branch_table
     from brakecli.files.atomic import new_output
     from brakecli.files.field import values_of
     from brakecli.files.fields import BRANCH
+    from brakecli.front.branch_table import branch_table
     from brakecli.runs.branch import branch, line_of, start_of, write
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit

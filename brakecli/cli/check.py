@@ -4,9 +4,9 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import is_sweep, load_case, load_sweep
 from brakecli.cli.options import AsJson, ForceRead, Overrides, Quiet, source_argument
 from brakecli.cli.output import show_result, warn
+from brakecli.front.inputs import is_sweep, load_case, load_sweep
 
 OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
 
@@ -21,7 +21,7 @@ def command(
     """Validate a case or a sweep; estimate its cost and limits."""
     if is_sweep(file):
         sweep = load_sweep(file, overrides)
-        from brakecli.cli.tables import estimate_table
+        from brakecli.front.tables import estimate_table
         from brakecli.runs.limits import free_bytes
         from brakecli.sweeps.cost import estimate, refuse_sweep
         from brakecli.sweeps.driver import cores
@@ -34,7 +34,7 @@ def command(
         return
     loaded = load_case(file, overrides)
     from brakecli.case.system import system_of
-    from brakecli.cli.tables import check_table
+    from brakecli.front.tables import check_table
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
 
     with within_range():

@@ -3,9 +3,9 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
 from brakecli.cli.output import progress, show_result
+from brakecli.front.inputs import load_case, result_path
 from brakecli.solver.schemes import SCHEMES
 
 STEPS = "Time steps in s; the largest is a whole multiple of each."
@@ -28,11 +28,11 @@ def command(
     """Compare all schemes by error and cost; recommend one."""
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending="-schemes.h5")
-    from brakecli.cli.tables import comparison_table
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps
     from brakecli.comparison.result import ComparisonReport, write
     from brakecli.files.atomic import new_output
+    from brakecli.front.tables import comparison_table
     from brakecli.runs.run import load_kernels
 
     chosen, ladder = parse_schemes(schemes), parse_steps(steps)

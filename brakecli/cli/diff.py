@@ -21,11 +21,11 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """How two results differ: case, numbers, curves."""
-    from brakecli.cli.file_tables import diff_table
     from brakecli.files import fields
     from brakecli.files.contents import difference
     from brakecli.files.field import values_of
     from brakecli.files.read import open_result
+    from brakecli.front.file_tables import diff_table
 
     with unwinding():
         with open_result(first) as a, open_result(second) as b:

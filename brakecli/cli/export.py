@@ -3,10 +3,10 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import result_path
 from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.files.os_signals import unwinding
+from brakecli.front.inputs import result_path
 
 GROUP = "Of a run: history (default), spectrum, over_time, spectrogram, vibrations."
 VARIABLE = "Variable to export, of a table repeatable; all of them, or vx for sound, if left out."

@@ -6,11 +6,12 @@ from typing import Annotated
 
 import typer
 
-from brakecli.cli.inputs import as_argument
 from brakecli.cli.options import Force, Quiet, option, output_option
-from brakecli.cli.output import say, show
+from brakecli.cli.output import show
 from brakecli.errors import UsageError, printable
+from brakecli.faces import as_argument
 from brakecli.files.os_signals import unwinding
+from brakecli.front.progress import say
 
 NAME = "Name of the file, with or without .toml; that of a starter gives this one, others the starter of a case."
 
@@ -24,8 +25,8 @@ def command(
 ) -> None:
     """Write a commented starter case or sweep that runs."""
     from brakecli.case.read import starters
-    from brakecli.cli.tables import grid
     from brakecli.files.atomic import new_output
+    from brakecli.front.tables import grid
 
     texts = starters()
     if listed:

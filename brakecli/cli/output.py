@@ -1,19 +1,14 @@
 """What a command prints: results on standard output; warnings, progress and failures on standard error."""
 
 import json
-import shutil
 import sys
-import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from textwrap import wrap
-from typing import Any, TextIO, cast
+from typing import Any
 
 from brakecli.files.os_signals import Styled, unwinding
 from brakecli.files.trust import readings
-
-FIRST_LINE, LAST_LINES = 20.0, 600.0
-"""Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
+from brakecli.front.progress import say, telling
 
 
 def show(text: str) -> None:
@@ -37,17 +32,6 @@ def show_result(
         print(table(*found), file=Styled(sys.stdout), flush=True)  # it escapes what is in its cells
 
 
-def say(*lines: str) -> None:
-    """Print lines on standard error; a terminal, which would break them within words, gets shorter ones."""
-    for line in lines:
-        text = f"brakecli: {line}"
-        if sys.stderr is not None and sys.stderr.isatty():
-            width = shutil.get_terminal_size().columns
-            pieces = wrap(text, width, subsequent_indent="  ", break_long_words=False, break_on_hyphens=False)
-            text = "\n".join(pieces)
-        print(text, file=sys.stderr, flush=True)  # noqa: T201
-
-
 def warn(*warnings: str) -> None:
     """Print warnings on standard error."""
     say(*(f"warning: {warning}" for warning in warnings))
@@ -67,36 +51,3 @@ def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
     """
     with unwinding(), telling(quiet) as tell:
         yield tell
-
-
-@contextmanager
-def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield such a function: a bar; without a terminal lines, after some seconds and then ever less often.
-
-    What a line has said of is also said when it is complete.
-    """
-    if quiet or sys.stderr is None or not sys.stderr.isatty():
-        start, due, open_total = time.monotonic(), first_line, 0
-
-        def tell(what: str, done: int, total: int) -> None:
-            nonlocal due, open_total
-            ends = 0 < done == total == open_total
-            if not quiet and ((passed := time.monotonic() - start) >= due or ends):
-                open_total = total if done < total else 0
-                due = passed + min(passed, LAST_LINES)
-                say(f"{what} {done} of {total}, {passed:.0f} s" if total else f"{what}, {passed:.0f} s")
-
-        yield tell
-        return
-    from rich import progress as rich_progress
-    from rich.console import Console
-
-    console = Console(file=cast(TextIO, Styled(sys.stderr)))
-    columns = (*rich_progress.Progress.get_default_columns(), rich_progress.MofNCompleteColumn())
-    with rich_progress.Progress(*columns, console=console, transient=True) as bar:
-        task = bar.add_task("", visible=False)
-
-        def show(what: str, done: int, total: int) -> None:
-            bar.update(task, description=what, completed=done, total=total, visible=True)
-
-        yield show

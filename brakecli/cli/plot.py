@@ -3,12 +3,14 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import as_argument, is_sweep
-from brakecli.cli.measured import UNMEASURED, Measured, with_measured
+from brakecli.cli.measured import UNMEASURED, with_measured
 from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError
+from brakecli.faces import as_argument
 from brakecli.files.os_signals import unwinding
+from brakecli.front.inputs import is_sweep
+from brakecli.front.measured import Measured
 
 SOURCE = "Result of any kind; with --quantity a measured signal, as for classify."
 SELECT = "Draw the nearest value of a sweep's axis; repeatable."

@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, Force, ForceRead, Overrides, Quiet, output_option, source_argument
-from brakecli.cli.output import progress, say, show_result, warn
+from brakecli.cli.output import progress, show_result, warn
 from brakecli.errors import BrakecliError
+from brakecli.front.inputs import load_case, result_path
+from brakecli.front.progress import say
 
 SOURCE = 'Case file, "-" for standard input, or a result file, whose case is run again.'
 
@@ -23,7 +24,7 @@ def command(
     """Simulate one case; write motion and regime to HDF5."""
     loaded = load_case(case, overrides)
     target = result_path(output, case)
-    from brakecli.cli.tables import run_table
+    from brakecli.front.tables import run_table
     from brakecli.runs.run import load_kernels, origin, run
 
     load_kernels(loaded)

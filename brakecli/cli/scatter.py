@@ -4,10 +4,10 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import load_study, result_path
 from brakecli.cli.options import SET, AsJson, Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import progress, show_result, warn
 from brakecli.cli.sweep import JOBS, SCHEDULER, SCHEDULER_FILE
+from brakecli.front.inputs import load_study, result_path
 
 SETTING = "Set a key of the study, as samples, or of its case; repeatable."
 
@@ -26,7 +26,7 @@ def command(
     """How likely brakes squeal whose numbers scatter."""
     loaded = load_study(file, overrides)
     target = result_path(output, file, kind="study")
-    from brakecli.cli.scatter_table import scatter_table
+    from brakecli.front.scatter_table import scatter_table
     from brakecli.scattering.scatter import engine_for, scatter
     from brakecli.sweeps.driver import keeping_points
 

@@ -4,10 +4,11 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from brakecli.cli.inputs import load_case, result_path
 from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
-from brakecli.cli.output import progress, say, show_result
+from brakecli.cli.output import progress, show_result
 from brakecli.errors import UsageError, printable
+from brakecli.front.inputs import load_case, result_path
+from brakecli.front.progress import say
 
 if TYPE_CHECKING:
     from brakecli.sweeps.tables import Axis
@@ -35,9 +36,9 @@ def command(
     from brakecli.analysis.stability.report import stability
     from brakecli.branches.thresholds import thresholds
     from brakecli.case.system import system_of
-    from brakecli.cli.stability_tables import stability_table
     from brakecli.files.field import values_of
     from brakecli.files.fields import LOCK_IN, STABILITY, THRESHOLDS
+    from brakecli.front.stability_tables import stability_table
     from brakecli.runs.limits import sliding_text, within_range
 
     with progress(quiet) as show_progress, within_range():

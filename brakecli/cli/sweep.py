@@ -3,10 +3,11 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import load_sweep, result_path
 from brakecli.cli.options import SET, AsJson, Quiet, option, output_option, source_argument
-from brakecli.cli.output import progress, say, show_result, warn
+from brakecli.cli.output import progress, show_result, warn
 from brakecli.errors import BrakecliError
+from brakecli.front.inputs import load_sweep, result_path
+from brakecli.front.progress import say
 
 JOBS = "Worker processes  [default: one for each core]"
 SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
@@ -34,7 +35,7 @@ def command(
     """
     loaded = load_sweep(file, overrides)
     target = result_path(output, file, kind="sweep")
-    from brakecli.cli.tables import sweep_table
+    from brakecli.front.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate
     from brakecli.sweeps.driver import choose_engine, counting, keeping_points, sweep

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from brakecli.errors import UsageError
+from brakecli.faces import argument
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.method import Method
 from brakecli.solver.schemes import SCHEMES
@@ -71,7 +72,9 @@ def parse_schemes(text: str | None) -> list[str]:
     names = [name.strip() for name in (text or "").split(",") if name.strip()]
     for name in names:
         if name not in SCHEMES:
-            raise UsageError(f"--schemes {text}: there is no scheme {name}; give some of {', '.join(SCHEMES)}")
+            raise UsageError(
+                f"{argument('schemes')} {text}: there is no scheme {name}; give some of {', '.join(SCHEMES)}"
+            )
     return names
 
 
@@ -84,12 +87,15 @@ def parse_steps(text: str | None) -> list[float]:
     except ValueError:
         steps = []
     if not steps or not all(1e-100 < step < 1e100 for step in steps):
-        raise UsageError(f"--steps {text}: is not a list of steps; write, for instance, --steps 1e-5,5e-6")
+        raise UsageError(
+            f"{argument('steps')} {text}: is not a list of steps; "
+            f"write, for instance, {argument('steps')} 1e-5,5e-6"
+        )
     largest = max(steps)
     if any(abs(largest / step - round(largest / step)) > 1e-9 * largest / step for step in steps):
-        raise UsageError(f"--steps {text}: each must divide the largest; halve it, for instance")
+        raise UsageError(f"{argument('steps')} {text}: each must divide the largest; halve it, for instance")
     if len({round(largest / step) for step in steps}) < len(steps):
-        raise UsageError(f"--steps {text}: names a step twice; give each once")
+        raise UsageError(f"{argument('steps')} {text}: names a step twice; give each once")
     return steps
 
 

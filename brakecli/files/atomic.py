@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from brakecli.errors import CannotWriteError, UsageError
+from brakecli.faces import argument
 from brakecli.files.os_signals import signals_deferred
 
 _REMEDIES = {
@@ -98,7 +99,7 @@ def check_target(target: Path, what: str, suffixes: Sequence[str], results: Iter
     if target.suffix.lower() not in suffixes:
         problem = f"its suffix does not name {what} (found {target.suffix!r})"
         named = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
-        raise UsageError(f"{target}: {problem}; name a file that ends in {named} with -o")
+        raise UsageError(f"{target}: {problem}; name a file that ends in {named} with {argument('output')}")
     for result in results:
         refuse_source(target, result, "result")
 
@@ -107,7 +108,9 @@ def refuse_source(target: Path, source: str | Path, what: str) -> None:
     """Raise UsageError where a target is the file that it is made of."""
     with suppress(OSError, ValueError):  # one of them does not exist, or cannot
         if target.samefile(source):
-            raise UsageError(f"{target}: this is the {what} itself; choose another output with -o")
+            raise UsageError(
+                f"{target}: this is the {what} itself; choose another output with {argument('output')}"
+            )
 
 
 @contextmanager
@@ -155,7 +158,10 @@ def _checked_target(path: Path, *, force: bool) -> Path:
     if not stat.S_ISREG(mode):  # replacing /dev/null would harm more than this command
         raise _refused(path, "this is not a regular file")
     if not force:
-        raise UsageError(f"{path}: exists already; replace it with --force, or choose another output with -o")
+        raise UsageError(
+            f"{path}: exists already; "
+            f"replace it with {argument('force')}, or choose another output with {argument('output')}"
+        )
     return target
 
 
@@ -169,7 +175,7 @@ def _acquired(path: Path, lock: Path) -> int:
             raise _not_ours(lock)
         if not _take(descriptor, holder):
             os.close(descriptor)
-            remedy = "wait until it has ended, or choose another output with -o"
+            remedy = f"wait until it has ended, or choose another output with {argument('output')}"
             raise UsageError(f"{path}: is being written by {holder or 'another process'}; {remedy}")
         with suppress(FileNotFoundError):  # its last holder has removed it meanwhile
             if os.path.samestat(os.fstat(descriptor), lock.lstat()):
@@ -222,7 +228,7 @@ def open_own(path: str | Path, flags: int) -> int:
 
 def _not_ours(path: str | Path) -> CannotWriteError:
     what = "is in the way: it is not a file that this program has written"
-    return CannotWriteError(f"{path}: {what}; move it away, or choose another output with -o")
+    return CannotWriteError(f"{path}: {what}; move it away, or choose another output with {argument('output')}")
 
 
 @contextmanager
@@ -237,4 +243,6 @@ def explained(path: Path) -> Iterator[None]:
 
 
 def _refused(path: Path, reason: str, remedy: str = "") -> CannotWriteError:
-    return CannotWriteError(f"{path}: cannot write: {reason}; {remedy}choose another output with -o")
+    return CannotWriteError(
+        f"{path}: cannot write: {reason}; {remedy}choose another output with {argument('output')}"
+    )

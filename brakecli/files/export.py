@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError, escaped
+from brakecli.faces import argument
 from brakecli.files import fields
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.field import plain_units
@@ -62,17 +63,19 @@ def export(
         group = group or ("branch_1" if "branch_1" in result.groups else "branch_0")
         if not group.startswith("branch_") or "/" in group or group not in result.groups:
             branches = ", ".join(name for name in result.groups if name.startswith("branch_") and "/" not in name)
-            raise UsageError(f"--group {group}: there is none; give one of {branches}")
+            raise UsageError(f"{argument('group')} {group}: there is none; give one of {branches}")
     elif kind != "run" and (group or suffix == ".wav"):
-        what = f"--group {group}" if group else str(target)
-        raise UsageError(f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without --group")
+        what = f"{argument('group')} {group}" if group else str(target)
+        raise UsageError(
+            f"{what}: is for runs, and {result.path} is a {kind}; export it as .csv without {argument('group')}"
+        )
     if not numbered and group not in (None, *_AXES):
-        raise UsageError(f"--group {group}: there is none; give one of {', '.join(_AXES)}")
+        raise UsageError(f"{argument('group')} {group}: there is none; give one of {', '.join(_AXES)}")
     if group and group not in result.file:
         where = "with output.events = true" if group == "events" else "where speed or load change"
-        raise UsageError(f"--group {group}: this run has none; it has one {where}")
+        raise UsageError(f"{argument('group')} {group}: this run has none; it has one {where}")
     if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
-        remedy = "give one --variable and no other group"
+        remedy = f"give one {argument('variable')} and no other group"
         raise UsageError(f"{target}: a sound is one variable of the history; {remedy}")
     mark = readings.mark()
     if suffix == ".wav" and mark:
@@ -155,7 +158,9 @@ def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -
     """The wanted names, or all there are; raises UsageError for one that is not there."""
     for name in names:
         if name not in there:
-            raise UsageError(f"--variable {name}: {result.path} has none; give one of {', '.join(there)}")
+            raise UsageError(
+                f"{argument('variable')} {name}: {result.path} has none; give one of {', '.join(there)}"
+            )
     return names or there
 
 
@@ -181,7 +186,7 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
     values = values - np.mean(values) if len(values) else values
     if not np.any(values):
         silent = f"{name} does not change, there is nothing to hear"
-        raise UsageError(f"{result.path}: {silent}; name another --variable")
+        raise UsageError(f"{result.path}: {silent}; name another {argument('variable')}")
     rate, notes = len(values) / duration, list[str]()
     power, frequency = np.abs(np.fft.rfft(values)) ** 2, np.fft.rfftfreq(len(values), 1.0 / rate)
     if rate > RATE:

@@ -11,7 +11,6 @@ Damage that a digest was made to fit ends or blocks HDF5 itself. So another proc
 import hashlib
 import os
 import resource
-import shlex
 import signal
 import warnings
 from collections.abc import Callable, Iterator, Mapping
@@ -27,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import OtherKindError, UnreadableResultError, printable
+from brakecli.faces import argument, command
 from brakecli.files import trust, valid
 from brakecli.files.opening import SIGNATURE, hdf5_begin, opened
 
@@ -167,7 +167,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             length, state = os.fstat(stream.fileno()).st_size, _digest_of(stream)
             if not trust.readings.admit(str(path), state):
                 what = "the file is truncated, damaged or was altered by another program"
-                raise ValueError(f"{what}, and only --force-read looks at it all the same")
+                raise ValueError(f"{what}, and only {argument('force-read')} looks at it all the same")
             look = partial(valid.look_through, length=length, everything=bool(state))
             try_out(stream, look)
             # h5py gets the very file that was looked at, and does without the file locks of HDF5
@@ -263,6 +263,6 @@ def _explained(path: Path) -> Iterator[None]:
         if path.suffix == ".toml" and not isinstance(error, OSError):
             what, remedy = (
                 f"{path}: this is no result yet",
-                f"compute it first: brakecli run {shlex.quote(str(path))}",
+                f"compute it first: {command('run', path)}",
             )
         raise UnreadableResultError(f"{what}; {remedy}") from error

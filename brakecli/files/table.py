@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError, printable
+from brakecli.faces import argument
 from brakecli.files.opening import contents
 
 Array = NDArray[Any]
@@ -93,11 +94,11 @@ class TextTable:
     def columns_of(self, column: str | None, time_column: str | None) -> list[Array]:
         """The chosen column, and the times where they are in a column."""
         there = ", ".join(self.names) or f"columns 1 to {self.columns}, without names"
-        times = [] if time_column is None else [self._index(time_column, "--time-column", there)]
+        times = [] if time_column is None else [self._index(time_column, argument("time-column"), there)]
         others = [i for i in range(self.columns) if i not in times]
-        values = others if column is None else [self._index(column, "--column", there)]
+        values = others if column is None else [self._index(column, argument("column"), there)]
         if len(values) != 1:
-            raise UsageError(f"which column is the signal? give --column; there are {there}")
+            raise UsageError(f"which column is the signal? give {argument('column')}; there are {there}")
         self.places = chosen = [*values, *times]
         last = self.columns - 1
         table = self._read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from brakecli.errors import UsageError
+from brakecli.faces import argument
 from brakecli.files.atomic import OutputFile, new_output
 from brakecli.files.field import Field
 from brakecli.files.opening import is_hdf5
@@ -257,7 +258,10 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     """
     with suppress(OSError, ValueError):
         if force and path.suffix != ".h5" and path.is_file() and path.stat().st_size and not is_hdf5(path):
-            raise UsageError(f"{path}: is no result, and is not replaced by one; choose another output with -o")
+            raise UsageError(
+                f"{path}: is no result, and is not replaced by one; "
+                f"choose another output with {argument('output')}"
+            )
     with new_output(path, force=force) as output, closing(ResultFile(output)) as result:
         result.open()
         yield result

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from brakecli.errors import UsageError, installed, printable
+from brakecli.faces import argument
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
 
@@ -83,7 +84,9 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
             if kind != "run"
             else "is a picture of its own"
         )
-        raise UsageError(f"--section {section}: {what}; leave {'it' if kind != 'run' else '--variable'} out")
+        raise UsageError(
+            f"{argument('section')} {section}: {what}; leave {'it' if kind != 'run' else argument('variable')} out"
+        )
     if kind == "sweep":
         picture = sweep.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
@@ -93,11 +96,15 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
         known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
-        raise UsageError(f"{result.path}: --select is for sweeps (found {select[0]!r}); leave it out for a {kind}")
+        raise UsageError(
+            f"{result.path}: {argument('select')} is for sweeps (found {select[0]!r}); leave it out for a {kind}"
+        )
     if section:
         return sections.draw(result, section)
     if kind == "run":
         return run.draw(run.RunPicture(result, variable or "vx"))
     if variable:
-        raise UsageError(f"{result.path}: --variable is for runs and sweeps (found {variable!r}); leave it out")
+        raise UsageError(
+            f"{result.path}: {argument('variable')} is for runs and sweeps (found {variable!r}); leave it out"
+        )
     return others[kind](result)

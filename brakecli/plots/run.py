@@ -17,6 +17,7 @@ from brakecli.analysis.stability.modes import modes
 from brakecli.case.read import LoadedCase, parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError
+from brakecli.faces import argument
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
@@ -47,7 +48,7 @@ class RunPicture:
     def __init__(self, result: StoredResult, variable: str = "vx") -> None:
         """Read it from a result; raises UnreadableResultError, or UsageError where no variable has this name."""
         if variable not in VARIABLES:
-            problem = f"--variable {variable}: a run has no such quantity"
+            problem = f"{argument('variable')} {variable}: a run has no such quantity"
             raise UsageError(f"{result.path}: {problem}; give one of {', '.join(VARIABLES)}")
         self.variable, self.ordinate = variable, "vx" if variable == "x" else variable
         self.whole = "x" if variable == "vx" else variable

@@ -8,6 +8,7 @@ from scipy.interpolate import CubicHermiteSpline
 
 from brakecli.case.system import system_of
 from brakecli.errors import UsageError
+from brakecli.faces import argument
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import scaled
@@ -39,7 +40,7 @@ def draw(result: StoredResult, section: str) -> Figure:
         points, where = _at_events(result, section, begin), f"at each {section}"
     else:
         known = ", ".join((WAVE, *KINDS))
-        raise UsageError(f"--section {section}: there is no such section; give one of {known}")
+        raise UsageError(f"{argument('section')} {section}: there is no such section; give one of {known}")
     last = {name: result.read("history", name, first) for name in _STATE}
     count = f"{len(points['x'])} points from {begin:.4g} s on"
     title = case_of(result).case.title or "Case without a title"
@@ -65,18 +66,21 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
     passing = np.abs(system.belt_speed) * system.wheel.turns
     if not system.steady or not passing.any():
         remedy = f"give an event: {', '.join(KINDS)}"
-        raise UsageError(f"--section {WAVE}: no wave of a rough wheel passes at a constant speed; {remedy}")
+        raise UsageError(
+            f"{argument('section')} {WAVE}: no wave of a rough wheel passes at a constant speed; {remedy}"
+        )
     forced = result.attributes.get("forced_frequency")
     wave = np.argmin(np.abs(passing - forced)) if forced else np.argmax(np.abs(system.wheel.g))
     frequency, (start, end, interval) = float(passing[wave]), time
     if frequency * interval > 1.0 / _FEWEST:
         what = f"samples every {interval:.3g} s do not resolve the wave of {frequency:.4g} Hz"
         raise UsageError(
-            f"--section {WAVE}: {what}; run with output.sample_interval={1.0 / frequency / _FEWEST:.2g}"
+            f"{argument('section')} {WAVE}: {what}; "
+            f"run with output.sample_interval={1.0 / frequency / _FEWEST:.2g}"
         )
     times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1) / frequency
     if not len(times):
-        raise UsageError(f"--section {WAVE}: less than a period from {begin:.4g} s on; run longer")
+        raise UsageError(f"{argument('section')} {WAVE}: less than a period from {begin:.4g} s on; run longer")
     places, parts = np.minimum((times - start) / interval, (end - start) / interval - 1.0).astype(int), []
     for first in range(int(places[0]), int(places[-1]) + 1, BLOCK):
         there, part = times[(places >= first) & (places < first + BLOCK)], (first, first + BLOCK + 1)
@@ -92,11 +96,11 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
 def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
     """The states at the events of a kind."""
     if "events" not in result.file:
-        remedy = "run its case again with --set output.events=true"
-        raise UsageError(f"--section {kind}: {result.path} holds no events; {remedy}")
+        remedy = f"run its case again with {argument('set')} output.events=true"
+        raise UsageError(f"{argument('section')} {kind}: {result.path} holds no events; {remedy}")
     there = result.read("events", "time") >= begin
     kinds = result.read("events", "kind")[there]
     if kind not in kinds:
         known = f"give one of {', '.join(sorted({*kinds.tolist()}))}" if len(kinds) else "run longer"
-        raise UsageError(f"--section {kind}: {result.path} has none from {begin:.4g} s on; {known}")
+        raise UsageError(f"{argument('section')} {kind}: {result.path} has none from {begin:.4g} s on; {known}")
     return {name: result.read("events", name)[there][kinds == kind] for name in _STATE}

@@ -13,6 +13,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
+from brakecli.faces import argument
 from brakecli.files import fields
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
@@ -238,7 +239,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
         variables[name] = read(name) if there else np.full((*shape, 1), np.nan)
     if shown and shown not in (able := numeric(result)):
-        problem = f"--variable {shown}: no number of its points has this name"
+        problem = f"{argument('variable')} {shown}: no number of its points has this name"
         raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
     base = str(result.attributes.get("resolved_toml", ""))
     margin = None
@@ -298,7 +299,7 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
             problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
     some = textwrap.shorten(", ".join(choices), 120, placeholder=" …")
     remedy = f"give one of {some}, as KEY=VALUE" if choices else "leave it out"
-    raise UsageError(f"{result.path}: --select {wanted}: {problem}; {remedy}")
+    raise UsageError(f"{result.path}: {argument('select')} {wanted}: {problem}; {remedy}")
 
 
 def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:
@@ -306,7 +307,7 @@ def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:
     count, both = len(picture.axes), len(picture.directions) > 1
     keys = ", ".join([axis.key for axis in picture.axes] + both * ["direction"])
     least = min((len(axis.values) for axis in picture.axes), default=0)
-    remedy = f"draw a part of it with --select KEY=VALUE for one of {keys}"
+    remedy = f"draw a part of it with {argument('select')} KEY=VALUE for one of {keys}"
     if count == 0:
         problem = "a single point makes no picture"
         remedy = "sweep along an [[axis]] of two values or more, or read the point's numbers in the file"

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from brakecli.errors import UsageError
+from brakecli.faces import argument
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.lock_in import FEW
@@ -148,10 +149,12 @@ def _axis_of(results: tuple[StoredResult, StoredResult], names: tuple[str, ...])
         dims = [each[name].dims if name in each else () for each in known]
         if not dims[0] or dims[0] != dims[1] or any(_is_text(result, name) for result in results):
             problem = f"{name} is not a number along the same axes in both"
-            raise UsageError(f"{files}: {problem}; name another --variable, or leave -o out")
+            raise UsageError(
+                f"{files}: {problem}; name another {argument('variable')}, or leave {argument('output')} out"
+            )
     axes = [dim for dim in known[0][names[0]].dims if dim != "mode"]
     if len(axes) != 1 or any(_is_text(result, axes[0]) for result in results):
-        remedy = "draw each of them with brakecli plot, and leave -o out"
+        remedy = f"draw each of them with brakecli plot, and leave {argument('output')} out"
         raise UsageError(f"{files}: only numbers along one axis of numbers are curves; {remedy}")
     return axes[0]
 

@@ -14,6 +14,7 @@ from brakecli.branches.line import ALONE, Line
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_resolved
 from brakecli.errors import UsageError, printable
+from brakecli.faces import argument
 from brakecli.files import fields
 from brakecli.files.field import Field, integer, values_of
 from brakecli.files.read import open_result
@@ -50,7 +51,7 @@ def line_of(loaded: LoadedCase, keys: Sequence[str], low: float, high: float, op
     return line
 
 
-def parsed(text: str, option: str = "--parameter") -> tuple[tuple[str, ...], float, float]:
+def parsed(text: str) -> tuple[tuple[str, ...], float, float]:
     """Keys and both ends of KEY[,KEY]=LOW:HIGH; raises UsageError."""
     keys, _, numbers = text.partition("=")
     names = tuple(keys.split(","))
@@ -66,7 +67,9 @@ def parsed(text: str, option: str = "--parameter") -> tuple[tuple[str, ...], flo
         ):
             return names, low, high
     what = "is not KEY[,KEY]=LOW:HIGH with LOW below HIGH, and no key twice"
-    raise UsageError(f"{option} {printable(text)}: {what}; write, for instance, friction.coefficient=0:1.5")
+    raise UsageError(
+        f"{argument('parameter')} {printable(text)}: {what}; write, for instance, friction.coefficient=0:1.5"
+    )
 
 
 def start_of(path: Path, keys: Sequence[str]) -> Start:
@@ -87,7 +90,8 @@ def branch(
         value = line.own if start.value is None else start.value
         if value is None or not line.low <= value <= line.high:
             raise UsageError(
-                f"--start: the value of {', '.join(line.keys)} in its case is not in the range; widen --parameter"
+                f"{argument('start')}: the value of {', '.join(line.keys)} in its case is not in the range; "
+                f"widen {argument('parameter')}"
             )
         states.append((line.place(value), start.state))
     return Answers(Explorer(line, tell, stop).explore(states, switch), line.own)

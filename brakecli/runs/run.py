@@ -12,7 +12,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from brakecli import __version__
+from brakecli.about import __version__
 from brakecli.analysis.over_time import OverTime, over_time
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
+from brakecli.faces import argument
 from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
 from brakecli.solver.period import common_period
@@ -128,5 +129,5 @@ def refuse_sweep(found: Estimate, free_bytes: float) -> None:
         raise RefusedError(f"the file would be too large, {free}: {found.sentence()}; {remedy}")
     with suppress(ValueError, OSError):  # systems that do not say how much memory they have
         if found.memory > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
-            remedy = "take fewer --jobs, or sample less often"
+            remedy = f"take fewer {argument('jobs')}, or sample less often"
             raise RefusedError(f"the sweep needs more memory than there is: {found.sentence()}; {remedy}")

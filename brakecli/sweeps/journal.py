@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError, value_text
+from brakecli.faces import argument
 from brakecli.files.atomic import explained, open_own
 from brakecli.files.field import flat
 from brakecli.files.toml_lines import parse
@@ -124,7 +125,7 @@ class Journal:
         if self._block[0] != start:
             packed = os.pread(self._file.fileno(), end - start, start)
             if zlib.crc32(packed) != checksum:
-                again = "run the same command again, with --force if it is refused"
+                again = f"run the same command again, with {argument('force')} if it is refused"
                 raise BrakecliError(f"{self.path}: was changed while in use; {again}")
             self._block = start, zlib.decompress(packed)
         return self._block[1]
@@ -244,11 +245,14 @@ def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
         there = json.loads(found)
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
-        return "holds no finished points, or its first line is damaged; remove it, or start again with --force"
+        return (
+            "holds no finished points, or its first line is damaged; "
+            f"remove it, or start again with {argument('force')}"
+        )
     if not keys:
         return ""
     were, are = ({key: value_text(held.get(key, "not set")).strip('"') for key in keys} for held in (there, own))
     each = [f"{key} was {were[key]}, is {are[key]}" for key in keys]
     each[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
-    remedy = "undo the change to go on, or start again with --force, which drops the finished points"
+    remedy = f"undo the change to go on, or start again with {argument('force')}, which drops the finished points"
     return f"holds finished points of another sweep: {', '.join(each)}; {remedy}"

@@ -8,7 +8,7 @@ import pytest
 
 from brakecli.analysis.stability.advice import KEYS
 from brakecli.case.read import parse_case, read_text
-from brakecli.cli.stability_tables import advice_table
+from brakecli.front.stability_tables import advice_table
 from brakecli.runs.advise import advise
 from tests.campaign import campaign
 from tests.cli.test_interrupted import interrupt, many_waves

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli import __released__, __version__
+from brakecli.about import __released__, __version__
 from brakecli.case.read import starters
 from brakecli.solver.quantities import HISTORY
 from tests.commands import (

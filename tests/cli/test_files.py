@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from brakecli import __version__
+from brakecli.about import __version__
 from brakecli.files import fields
 from brakecli.files.read import open_result
 from brakecli.plots import two

@@ -11,7 +11,7 @@ import pytest
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.cli.stability_tables import stability_table
+from brakecli.front.stability_tables import stability_table
 from brakecli.sweeps.lock_in import lock_in
 from brakecli.sweeps.tables import Axis
 from tests.commands import ROOT, brakecli, each, left_in

@@ -11,7 +11,8 @@ import pytest
 
 from brakecli.case.read import parse_case, starters
 from brakecli.cli import output
-from brakecli.cli.tables import grid, verdict_table
+from brakecli.front import progress
+from brakecli.front.tables import grid, verdict_table
 from brakecli.scattering.study import parse_study
 from brakecli.sweeps.plan import parse_sweep
 from tests.commands import ROOT, attributes, brakecli, each, left_in
@@ -75,10 +76,10 @@ def test_a_terminal_gets_messages_without_a_broken_word_and_a_file_gets_them_in_
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = f"sweep-of-angles.toml: {'is-not-readable ' * 12}{'directory/' * 9}"
-    output.say(words)
+    progress.say(words)
     assert capsys.readouterr().err == f"brakecli: {words}\n"
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
-    output.say(words)
+    progress.say(words)
     lines = capsys.readouterr().err.splitlines()
     assert " ".join(map(str.strip, lines)) == f"brakecli: {words}"
     assert len(lines) > 3

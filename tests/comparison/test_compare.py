@@ -15,7 +15,6 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.cli.tables import comparison_table
 from brakecli.comparison.compare import Comparison, Entry, compare, errors
 from brakecli.comparison.methods import (
     COARSEST,
@@ -30,6 +29,7 @@ from brakecli.comparison.methods import (
 )
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UsageError
+from brakecli.front.tables import comparison_table
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import NUMEROV, QUARTERS, load
 from tests.commands import ROOT, TINY, attributes, brakecli, left_in

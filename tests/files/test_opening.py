@@ -116,7 +116,7 @@ def test_a_digest_that_does_not_fit_needs_force_and_is_noted(tmp_path: Path) -> 
 
 
 def test_variables_of_libraries_are_fixed() -> None:
-    program = "import os, brakecli; brakecli.fix_environment(); print(sorted(os.environ.items()))"
+    program = "import os, brakecli.about as it; it.fix_environment(); print(sorted(os.environ.items()))"
     given = {"HDF5_DRIVER": "no", "MPLBACKEND": "module://x", "NUMBA_OPT": "0", "HDF5_USE_FILE_LOCKING": "FALSE"}
     done = subprocess.run([sys.executable, "-c", program], env=given, capture_output=True, text=True, check=True)
     assert "HDF5_DRIVER" not in done.stdout

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.cli.inputs import load_case
+from brakecli.front.inputs import load_case
 from brakecli.runs import own_error
 from brakecli.runs.own_error import SAFETY, Known, certify_by_own_error
 from brakecli.solver.motion import Motion, solve

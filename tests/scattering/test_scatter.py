@@ -16,9 +16,9 @@ from brakecli.analysis.probability import Probability
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
 from brakecli.case.tables import json_schema
-from brakecli.cli.inputs import load_case, load_study
 from brakecli.errors import BrakecliError, CaseError
 from brakecli.files.read import open_result
+from brakecli.front.inputs import load_case, load_study
 from brakecli.scattering.answers import Indices, quantiles
 from brakecli.scattering.draw import drawn, for_indices
 from brakecli.scattering.study import SCRAMBLINGS, Parameter, Study

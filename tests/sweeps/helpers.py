@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.cli.inputs import load_sweep
 from brakecli.errors import RefusedError
+from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.point import Status, blank, record_type

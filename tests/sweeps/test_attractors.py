@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 import brakecli
 from brakecli.case.read import starters
-from brakecli.cli.tables import sweep_table
 from brakecli.errors import UnreadableResultError
 from brakecli.files.read import open_result
+from brakecli.front.tables import sweep_table
 from brakecli.sweeps.plan import LoadedSweep, parse_sweep
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.task import compute_units

@@ -268,7 +268,7 @@ def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(
 
         other = here / "other"
         other.mkdir()
-        (other / "sitecustomize.py").write_text('import brakecli; brakecli.__version__ = "99.0"')
+        (other / "sitecustomize.py").write_text('from brakecli import about; about.__version__ = "99.0"')
         cluster.worker("--no-nanny")
         write_sweep(here, frictions(2000), ANGLES, case=SLOWER)  # far longer than a worker takes to start
         with started(*command, cwd=here) as process:

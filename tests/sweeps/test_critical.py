@@ -12,7 +12,7 @@ from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
-from brakecli.cli.inputs import load_sweep
+from brakecli.front.inputs import load_sweep
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.motion import solve
 from brakecli.solver.period import common_period

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from brakecli.cli.inputs import load_sweep
 from brakecli.errors import CannotWriteError
+from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.journal import identity
 from tests.commands import brakecli, left_in, shell
 from tests.sweeps.helpers import frictions, inline, interrupted, journal_size, write_sweep

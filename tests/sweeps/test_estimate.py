@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import tomli_w
 
-from brakecli.cli.inputs import load_sweep
+from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.cost import estimate
 from brakecli.sweeps.pilot import DRAWN, MOST, UNEVEN, Pilot, drawn
 from brakecli.sweeps.point import compute, line_points

@@ -13,11 +13,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli import __version__
+from brakecli.about import __version__
 from brakecli.case import profile
 from brakecli.case.roughness import Record
-from brakecli.cli.inputs import load_sweep
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
+from brakecli.front.inputs import load_sweep
 from brakecli.solver.compile import source_hash
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.journal import open_journal

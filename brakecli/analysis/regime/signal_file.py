@@ -18,6 +18,7 @@ import numpy as np
 from brakecli.analysis.regime.of_signal import Measurand, Signal
 from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
+from brakecli.faces import argument
 from brakecli.files.opening import contents, opened
 from brakecli.files.table import LARGEST, TextTable, si
 from brakecli.files.table import require as _require
@@ -41,7 +42,7 @@ _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
 
 _JUMPS = (
-    "a force of the contact jumps where slip ends, and --quantity force is that of the spring, which does not: "
+    "a force of the contact jumps where slip ends, and {} force is that of the spring, which does not: "
     "regime and frequency may be wrong; classify the velocity, or the result itself"
 )
 
@@ -62,7 +63,8 @@ def read_signal(
     """
     if sample_rate is not None and not 1.0 / _FARTHEST <= sample_rate <= 1.0 / _NEAREST:
         raise UsageError(
-            f"--sample-rate {sample_rate}: is not a number above 0 Hz (1e-12 to 1e12); give samples per second"
+            f"{argument('sample-rate')} {sample_rate}: is not a number above 0 Hz (1e-12 to 1e12); "
+            "give samples per second"
         )
     path, inside = Path(source), None
     there = os.path.exists(path)  # noqa: PTH110 - pathlib's may raise
@@ -70,16 +72,22 @@ def read_signal(
         path, inside = Path(found[1]), found[2]
     try:
         if time_unit is not None and time_column is None:
-            raise UsageError("--time-unit: is for a column of times; leave it out, or name one with --time-column")
+            raise UsageError(
+                f"{argument('time-unit')}: is for a column of times; "
+                f"leave it out, or name one with {argument('time-column')}"
+            )
         times, name, wanted = [], "", _SI[quantity]
         if path.suffix.lower() in (".wav", ".wave") and inside is None:
             if time_column is not None:
-                raise UsageError("--time-column: a sound file has no column of times; leave it out")
+                raise UsageError(f"{argument('time-column')}: a sound file has no column of times; leave it out")
             values, sample_rate = _sound(path, column, sample_rate)
             size = _size(None, unit, *wanted)
         elif (sample_rate is None) == (time_column is None):
             given = "are not given" if time_column is None else "are given twice"
-            raise UsageError(f"the times of the samples {given}; give --sample-rate HZ or --time-column NAME")
+            raise UsageError(
+                f"the times of the samples {given}; "
+                f"give {argument('sample-rate')} HZ or {argument('time-column')} NAME"
+            )
         elif inside is None:
             table = TextTable(path, "a CSV file, or FILE.h5:/path of an HDF5 file")
             values, *times = table.columns_of(column, time_column)
@@ -88,7 +96,9 @@ def read_signal(
             times = [time * _size(table.unit(clock[0], "second"), time_unit, "second") for time in times]
             name = table.names[place] if table.names else ""
         elif column is not None or time_column is not None:
-            raise UsageError("a dataset has no columns; leave out --column, and give --sample-rate HZ")
+            raise UsageError(
+                f"a dataset has no columns; leave out {argument('column')}, and give {argument('sample-rate')} HZ"
+            )
         else:
             values, written = _dataset(path, name := inside)
             size = _size(_written(written, unit, quantity), unit, *wanted)
@@ -97,7 +107,7 @@ def read_signal(
         near = f"its samples lie {signal.interval:g} s apart; check the unit of the times"
         _require(_NEAREST <= signal.interval <= _FARTHEST, near)
         of_contact = any(word in name for word in ("friction_force", "normal_force"))
-        jumps = [_JUMPS] * (of_contact and quantity is Measurand.FORCE)
+        jumps = [_JUMPS.format(argument("quantity"))] * (of_contact and quantity is Measurand.FORCE)
         return replace(signal, notes=(*signal.notes, *jumps))
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
@@ -114,14 +124,16 @@ def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> 
         if given is None:
             raise UsageError(f"{name}: there is no such unit; give one as in mm, um or m/s^2")
         if given[1] not in ("", *wanted):
-            raise UsageError(f"{name}: is {given[1]}, not {' or '.join(wanted)}; correct the unit, or --quantity")
+            raise UsageError(
+                f"{name}: is {given[1]}, not {' or '.join(wanted)}; correct the unit, or {argument('quantity')}"
+            )
         if found not in (None, given):
             another = f"the file gives another unit, of {found[0]:g} {found[1]}"
             raise UsageError(f"{name}: {another}; leave the option out")
         found = given
     size, base = found or (1.0, "")
     if base == "kilogram" and size > 1e-3:
-        what = "acceleration is in m/s^2 or g, not in kilograms; correct the unit, or --quantity"
+        what = f"acceleration is in m/s^2 or g, not in kilograms; correct the unit, or {argument('quantity')}"
         raise UsageError(what) if option else UnreadableResultError(what)
     return size * _GRAVITY if base == "kilogram" else size
 
@@ -132,9 +144,9 @@ def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float,
     found = si(text)
     if text in ("", "-", "1") or (option is not None and found is None):
         return None
-    _require(found is not None, f"there is no unit {printable(text)}; say with --unit what it means")
+    _require(found is not None, f"there is no unit {printable(text)}; say with {argument('unit')} what it means")
     fits = found and found[1] in _SI[quantity]
-    _require(fits, f"its unit {printable(text)} is no {quantity}; correct --quantity")
+    _require(fits, f"its unit {printable(text)} is no {quantity}; correct {argument('quantity')}")
     return found
 
 
@@ -170,13 +182,17 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
         raise UnreadableResultError(f"cannot be read: {what}; name an intact WAV file") from error
     _require(rate > 0, "it has no sampling rate; name an intact WAV file")
     if sample_rate not in (None, rate):
-        raise UsageError(f"--sample-rate {sample_rate:g}: the file has {rate} Hz; leave the option out")
+        raise UsageError(
+            f"{argument('sample-rate')} {sample_rate:g}: the file has {rate} Hz; leave the option out"
+        )
     _require(len(values) <= _MOST_SAMPLES, f"it has {len(values)} samples, {_MOST_SAMPLES} are the most; {_PART}")
     rows = np.atleast_2d(values.T)
     chosen = column or "1" * (len(rows) == 1)
     number = int(chosen) if chosen.isascii() and chosen.isdigit() else 0
     if not 1 <= number <= len(rows):
-        raise UsageError(f"which channel is the signal? give --column NUMBER; there are {len(rows)}, from 1")
+        raise UsageError(
+            f"which channel is the signal? give {argument('column')} NUMBER; there are {len(rows)}, from 1"
+        )
     if values.dtype.kind == "f":
         return rows[number - 1].astype(np.float64), float(rate)
     middle = 128.0 if values.dtype.kind == "u" else 0.0

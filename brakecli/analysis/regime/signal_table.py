@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 
 from brakecli.analysis.regime.table import Decision, Regime, Row, first
+from brakecli.faces import argument
 
 FEWEST_SAMPLES = 64
 
@@ -65,12 +66,14 @@ class SignalAnswers:
     @property
     def unseen(self) -> str:
         """What stays unknown without the belt's speed."""
-        return "; short stick would show only by --belt-speed" * (self.has_belt and not self.knows_belt)
+        return f"; short stick would show only by {argument('belt-speed')}" * (
+            self.has_belt and not self.knows_belt
+        )
 
     @property
     def give_belt(self) -> str:
         """What to do where the belt's speed would decide."""
-        return "give --belt-speed" * self.has_belt
+        return f"give {argument('belt-speed')}" * self.has_belt
 
 
 def steady(change: float, error: float, t: SignalThresholds) -> bool:

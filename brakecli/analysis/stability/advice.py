@@ -20,6 +20,7 @@ from brakecli.case.case import Case
 from brakecli.case.read import put
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError, printable
+from brakecli.faces import argument
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
@@ -136,7 +137,7 @@ def advised_keys(case: Case, patterns: Sequence[str]) -> list[Path]:
     for pattern in patterns:
         if pattern not in KEYS and not any(fnmatchcase(key, pattern) for key in known):
             what = "names no number that may be advised"
-            raise UsageError(f"--keys {printable(pattern)}: {what}; these are {', '.join(known)}")
+            raise UsageError(f"{argument('keys')} {printable(pattern)}: {what}; these are {', '.join(known)}")
     return [path for key, path in known.items() if any(fnmatchcase(key, pattern) for pattern in patterns)]
 
 

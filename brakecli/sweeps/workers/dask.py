@@ -9,6 +9,7 @@ from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
 from brakecli.errors import BrakecliError, RefusedError, UsageError
+from brakecli.faces import argument
 from brakecli.files.opening import contents
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt, fingerprint, headline
 
@@ -33,8 +34,8 @@ class ClusterEngine(Engine):
         """
         self._compute, self._versions, self._shared = compute, fingerprint(), None
         address = str(getattr(getattr(scheduler, "scheduler", None), "address", scheduler))
-        option, name = ("--scheduler", address) if scheduler_file is None else ("--scheduler-file", scheduler_file)
-        self._where = f"{option} {name}"
+        given, name = ("scheduler", address) if scheduler_file is None else ("scheduler-file", scheduler_file)
+        self._where = f"{argument(given)} {name}"
         address = address if scheduler_file is None else self._address_in(scheduler_file)
         self._client = self._connected(address, getattr(scheduler, "security", None))
         with ExitStack() as failed:

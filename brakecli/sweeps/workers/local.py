@@ -11,8 +11,9 @@ from multiprocessing import connection, get_context, parent_process, resource_tr
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
 
-from brakecli import ONE_THREAD
+from brakecli.about import ONE_THREAD
 from brakecli.errors import BrakecliError, UsageError
+from brakecli.faces import argument
 from brakecli.files.os_signals import signals_deferred
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
 
@@ -100,7 +101,7 @@ class LocalEngine(Engine):
                 self.pool.append(worker)
         except OSError as error:
             what = f"a worker process cannot be started: {error.strerror or error}"
-            remedy = "finished points are kept, run the same command again with fewer --jobs"
+            remedy = f"finished points are kept, run the same command again with fewer {argument('jobs')}"
             raise BrakecliError(f"{what}; {remedy}") from error
         return worker
 

@@ -11,8 +11,8 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple, Self
 
-import brakecli
-from brakecli import __version__
+from brakecli import about
+from brakecli.about import __version__
 from brakecli.sweeps.plan import Plan
 
 
@@ -92,5 +92,5 @@ def fingerprint() -> Mapping[str, str]:
     from brakecli.runs.run import versions
     from brakecli.solver.compile import source_hash
 
-    sources = source_hash(Path(brakecli.__file__).parent)
+    sources = source_hash(Path(about.__file__).parent)
     return {"brakecli_version": __version__, "brakecli_sources": sources, **versions()}

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from brakecli.cli.tables import grid, text_of, two_columns
+from brakecli.front.tables import grid, text_of, two_columns
 
 if TYPE_CHECKING:
     from brakecli.branches.answers import Answers

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from brakecli.analysis.stability.advice import rounded
-from brakecli.cli.tables import Row, grid, text_of, two_columns
 from brakecli.files import fields
+from brakecli.front.tables import Row, grid, text_of, two_columns
 
 if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from brakecli.cli.tables import grid, two_columns
+from brakecli.front.tables import grid, two_columns
 
 if TYPE_CHECKING:
     from brakecli.scattering.scatter import ScatterReport

@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from typing import Any
 
-from brakecli.cli.tables import grid, text_of, two_columns
 from brakecli.errors import value_text
 from brakecli.files.field import plain_units
+from brakecli.front.tables import grid, text_of, two_columns
 
 _ASIDE = ("regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
 

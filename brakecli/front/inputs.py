@@ -1,7 +1,6 @@
 """The files that a command is given: of which kind they are, what they hold, and where their results go."""
 
 import os
-import shlex
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -9,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
+from brakecli.faces import argument, command
 from brakecli.files.atomic import refuse_source
 from brakecli.files.opening import is_hdf5
 
@@ -30,12 +30,12 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
             return parse_case(*text, overrides or ())
         except CaseError as error:
             if is_sweep(source):
-                remedy = f"compute it with: brakecli sweep {as_argument(source)}"
+                remedy = f"compute it with: {command('sweep', source)}"
                 raise UsageError(f"{text[1]}: this is a sweep; {remedy}") from error
             from brakecli.sweeps.plan import kind_of
 
             if kind_of(text[0]) == "study":
-                remedy = f"compute it with: brakecli scatter {as_argument(source)}"
+                remedy = f"compute it with: {command('scatter', source)}"
                 raise UsageError(f"{text[1]}: this is a study; {remedy}") from error
             raise
     from brakecli.files.read import open_result
@@ -77,7 +77,7 @@ def _over_a_case(
         return parse(text, name, folder, overrides or ())
     except CaseError as error:
         if kind_of(text) == "case":
-            remedy = f"simulate it with: brakecli run {as_argument(source)}"
+            remedy = f"simulate it with: {command('run', source)}"
             raise UsageError(f"{name}: this is a case; {remedy}") from error
         raise
 
@@ -87,12 +87,6 @@ def is_sweep(source: str) -> bool:
     from brakecli.sweeps.plan import kind_of
 
     return not is_result(source) and kind_of(_text(source)[0]) == "sweep"
-
-
-def as_argument(path: str | Path) -> str:
-    """A path as the shell takes it, and as no command takes it for an option."""
-    text = str(path)
-    return shlex.quote(f"./{text}" if text.startswith("-") and text != "-" else text)
 
 
 def _text(source: str) -> tuple[str, str]:
@@ -118,7 +112,10 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
     if source != "-" and not is_result(source):
         refuse_source(target, source, kind)
     if target.suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
-        raise UsageError(f"{target}: a result is HDF5, not {target.suffix}; name a file that ends in .h5 with -o")
+        raise UsageError(
+            f"{target}: a result is HDF5, not {target.suffix}; "
+            f"name a file that ends in .h5 with {argument('output')}"
+        )
     return target
 
 

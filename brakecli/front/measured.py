@@ -1,0 +1,81 @@
+"""How a signal was measured: what `classify` and `plot` are told of it, in the shell and in Python."""
+
+import math
+from dataclasses import asdict, dataclass
+from numbers import Real
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from brakecli.errors import UsageError, printable
+from brakecli.faces import argument
+
+if TYPE_CHECKING:
+    from brakecli.analysis.regime.of_signal import SignalLook
+    from brakecli.analysis.regime.signal_table import SignalThresholds
+
+NUMBERS = ("sample_rate", "belt_speed", "stiffness")
+
+
+@dataclass(frozen=True)
+class Measured:
+    """How a signal was measured, and on what."""
+
+    quantity: str | None = None
+    column: str | None = None
+    time_column: str | None = None
+    sample_rate: float | None = None
+    unit: str | None = None
+    time_unit: str | None = None
+    belt_speed: float | None = None
+    stiffness: float | None = None
+
+    def quantity_of(self, source: str) -> str | None:
+        """What was measured, None of a result; raises UsageError for options that do not go with it."""
+        quantity = self.quantity or ("pressure" if Path(source).suffix.lower() in (".wav", ".wave") else None)
+        for name, value in asdict(self).items():
+            where = argument(name.replace("_", "-"))
+            if value is not None and quantity is None:
+                remedy = f"state with {argument('quantity')} what was measured"
+                raise UsageError(f"{where}: is only for a measured signal; {remedy}")
+            if name in NUMBERS and not isinstance(value, Real | None):
+                raise UsageError(f"{where} {printable(str(value))}: is not a number; give one in SI units")
+            if name in NUMBERS and _overflows(value):
+                raise UsageError(f"{where}: is too large for a number; give one in SI units")
+            if name == "stiffness" and value is not None and not 0.0 < value < math.inf:
+                raise UsageError(f"{where} {value}: is not a positive number; give one in SI units")
+            if name == "belt_speed" and value is not None and not math.isfinite(value):
+                raise UsageError(f"{where} {value}: is not a number; give one in SI units")
+        if self.stiffness is not None and quantity != "force":
+            raise UsageError(
+                f"{argument('stiffness')}: is for a measured force, not for a {quantity}; leave it out"
+            )
+        if self.belt_speed is not None and quantity == "pressure":
+            raise UsageError(
+                f"{argument('belt-speed')}: a pressure does not show the speed of the shoe; leave it out"
+            )
+        return quantity
+
+    def look_at(self, source: str, thresholds: "SignalThresholds | None" = None) -> "SignalLook":
+        """What the signal of a file shows."""
+        from brakecli.analysis.regime.of_signal import Measurand, look
+        from brakecli.analysis.regime.signal_file import read_signal
+        from brakecli.analysis.regime.signal_table import SignalThresholds
+
+        name, reading = self.quantity_of(source), asdict(self)
+        if name not in set(Measurand):
+            raise UsageError(
+                f"{argument('quantity')} {printable(str(name))}: is not known; give one of {', '.join(Measurand)}"
+            )
+        del reading["quantity"]
+        machine = {key: reading.pop(key) for key in ("belt_speed", "stiffness")}
+        signal = read_signal(source, Measurand(name), **reading)
+        return look(signal, Measurand(name), **machine, thresholds=thresholds or SignalThresholds())
+
+
+def _overflows(value: Real | None) -> bool:
+    """Whether a number, as a whole number of Python's may, exceeds the largest that is computed with."""
+    try:
+        float(value or 0.0)
+    except OverflowError:
+        return True
+    return False
