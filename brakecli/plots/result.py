@@ -73,7 +73,7 @@ def _opened(
 
 def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", section: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
-    from brakecli.plots import branch, comparison, curves, lock_in, maps, run, scatter, sweep
+    from brakecli.plots import branch, comparison, curves, gather, lock_in, maps, run, scatter
     from brakecli.plots import section as sections
 
     kind = str(result.attributes.get("kind"))
@@ -85,8 +85,8 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
         )
         raise UsageError(f"--section {section}: {what}; leave {'it' if kind != 'run' else '--variable'} out")
     if kind == "sweep":
-        picture = sweep.gather(result, select, variable)
-        return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
+        picture = gather.gather(result, select, variable)
+        return curves.draw(picture) if len(picture.axes) == 1 and not picture.listed else maps.draw(picture)
     others = {"comparison": comparison.draw, "stability": lock_in.draw}
     others |= {"branch": branch.draw, "scatter": scatter.draw}
     if kind != "run" and kind not in others:

@@ -122,9 +122,10 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     for axis in plan.sweep.axis:
         _write_along(result, axis.name, axis.parameter, axis.name, _values(axis))
     if plan.listed is not None:
-        result.axis("/", fields.LISTED_POINT, np.arange(plan.points))
-        for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True):
-            _write_along(result, key.replace(".", "_"), [key], fields.LISTED_POINT.name, column)
+        keys, point = plan.listed.keys, fields.LISTED_POINT
+        result.variable("/", point, (point.name,), np.arange(plan.points), parameters=[*keys])
+        for key, column in zip(keys, plan.listed.columns, strict=True):
+            _write_along(result, key.replace(".", "_"), [key], point.name, column)
     elif not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
     windows, critical = 0, plan.sweep.critical
