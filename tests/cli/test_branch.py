@@ -160,6 +160,8 @@ def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path
         (("--parameter", "friction.coefficient=1:0"), "LOW below HIGH"),
         (("--parameter", "friction.coefficient=0:nan"), "LOW below HIGH"),
         (("--parameter", "friction.coeff=0:1"), "friction.coeff"),
+        (("--parameter", "friction=0:1"), "a table, not a number (found 0.0); did you mean friction.coefficient?"),
+        (("--parameter", "load=0:1"), "did you mean load.force?"),
         (("--parameter", "friction.coefficient,friction.coefficient=0:1"), "no key twice"),
         (("--parameter", "link2.angle_deg=0:95"), "link2.angle_deg"),
         (
