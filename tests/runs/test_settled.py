@@ -30,6 +30,8 @@ from tests.analysis.test_verdicts import RINGS
 from tests.commands import TINY, attributes, brakecli
 from tests.examples import ROUGH, SQUEAL, make
 from tests.sweeps.helpers import axis, inline, write_sweep
+from tests.sweeps.made_up import CYCLE, SPEEDS, made_of
+from tests.sweeps.made_up import DAMPED as DIES
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -192,10 +194,25 @@ def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
     with open_result(tmp_path / "s.h5", kind="sweep") as stored:
         durations, regimes = stored.read("/", "duration"), stored.read("/", "regime")
     assert report.findings.warned == 0
+    ran = " to ".join(f"{each:.4g}" for each in durations)
+    assert report.findings.sentences == [f"all 2 points have settled, in {ran} s"]
     alone = [settle(parse_case(OPEN, "", [f"friction.coefficient={phi}"]).case).system for phi in (0.3, 0.565)]
     assert durations.tolist() == pytest.approx([each.duration for each in alone])
     assert durations[1] >= 4.0 * durations[0]
     assert {*regimes.tolist()} == {"damped"}
+
+
+def test_a_sweep_counts_the_points_that_have_not_settled(tmp_path: Path) -> None:
+    """Undecided ones, and those whose numbers are not those that last; one that fails is counted elsewhere."""
+    made = [{**CYCLE, "duration": 2.0}, {**DIES, "duration": 4.0}, {**CYCLE, "settled": 0, "duration": 16.0}]
+    made += [{"regime": "undecided", "duration": 32.0}, {"status": "failed"}]
+    loaded = write_sweep(tmp_path, SPEEDS.format(5), case=OPEN)
+    said = inline(loaded, tmp_path / "s.h5", made_of(made)).findings.sentences
+    ran = "2 of 5 points have settled, in 2 to 4 s; others ran for 16 to 32 s, and their reasons say more"
+    assert ran in said
+    numbers = write_sweep(tmp_path, axis("solver.duration", "values = [0.1, 0.2]"), case=OPEN)
+    said = inline(numbers, tmp_path / "n.h5", made_of(made)).findings.sentences
+    assert not any("settled" in each for each in said)
 
 
 def test_check_tells_how_long_a_run_may_become_and_a_number_is_not_touched() -> None:
