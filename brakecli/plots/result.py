@@ -88,8 +88,8 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
         picture = gather.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 and not picture.listed else maps.draw(picture)
     others = {"comparison": comparison.draw, "stability": lock_in.draw}
-    others |= {"branch": branch.draw, "scatter": scatter.draw}
-    if kind != "run" and kind not in others:
+    others |= {"scatter": scatter.draw}
+    if kind not in ("run", "branch", *others):
         known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
@@ -98,6 +98,9 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
         return sections.draw(result, section)
     if kind == "run":
         return run.draw(run.RunPicture(result, variable or "vx"))
+    if kind == "branch":
+        return branch.draw(result, variable)
     if variable:
-        raise UsageError(f"{result.path}: --variable is for runs and sweeps (found {variable!r}); leave it out")
+        known = "runs, sweeps and branches"
+        raise UsageError(f"{result.path}: --variable is for {known} (found {variable!r}); leave it out")
     return others[kind](result)
