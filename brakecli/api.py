@@ -407,7 +407,7 @@ def advise(
         if not (isinstance(margin, int | float) and 0.0 <= margin <= 10.0):
             raise UsageError(f"margin {margin}: is no number from 0 to 10")
         patterns = keys.split(",") if isinstance(keys, str) else KEYS if keys is None else [*map(str, keys)]
-        study = load_study(str(scatter), []) if scatter is not None else None
+        study = replace(load_study(str(scatter), []), base=loaded) if scatter is not None else None
         load_kernels(loaded)
         with within_range():
             report = advise(loaded, patterns, margin, tell)

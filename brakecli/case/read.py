@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from brakecli.case import wording
 from brakecli.case.case import Case, changed, resolved_toml
 from brakecli.case.roughness import Record, Records, arrays, reading
-from brakecli.case.tables import MISSING, Table, tables_within
+from brakecli.case.tables import MISSING, OverCase, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 from brakecli.faces import argument
 from brakecli.files import toml_lines
@@ -26,6 +26,7 @@ from brakecli.files.opening import SIGNATURE, opened
 from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 
 _Table = TypeVar("_Table", bound=Table)
+_OverCase = TypeVar("_OverCase", bound=OverCase)
 
 
 @dataclass(frozen=True)
@@ -158,6 +159,24 @@ def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[s
     if problems:
         raise CaseError(sorted(problems, key=lambda problem: (sources.index(problem.source), problem.line)))
     return table
+
+
+def parse_over_case(
+    kind: type[_OverCase], text: str, name: str, folder: Path, overrides: Sequence[str], own: Container[str]
+) -> tuple[_OverCase, LoadedCase, dict[KeyPath, int]]:
+    """Make a table of a file that names its case, seen from `folder`; the case; the line of each key.
+
+    Overrides of its `own` keys belong to the file, all others to its case. Raises `CaseError`.
+    """
+    for_file = [each for each in overrides if (*key_path(each.partition("=")[0]), "")[0] in own]
+    table, lines = parse_table(kind, text, name, for_file), Located(text, name).lines
+    try:
+        case_text, source = read_text(str(folder / table.case))
+    except CaseError as error:
+        at = Problem(("case",), "", "", name, lines.get(("case",), 0))
+        wrong = (replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems)
+        raise CaseError([*wrong]) from error
+    return table, parse_case(case_text, source, [each for each in overrides if each not in for_file]), lines
 
 
 def put(

@@ -176,6 +176,13 @@ class Table(BaseModel):
         return table
 
 
+class OverCase(Table):
+    """A table of a file that names its case."""
+
+    title: Title = ""
+    case: str = described("the case's file, seen from the file that names it", min_length=1)
+
+
 @cache
 def _adapter(kind: type[Table], key: str) -> TypeAdapter[Any]:
     """What makes the value of one key."""

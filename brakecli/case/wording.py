@@ -45,6 +45,9 @@ def problems(error: ValidationError, kind: type[Table], where: str = "at the top
         elif reason == "missing":
             if path not in misspelt:
                 yield Problem(path, MISSING, f"give {_expected(path, kind)}")
+        elif reason == "model_type" and isinstance(value, float) and (needed := _required(key_schema(kind, path))):
+            choices = " or ".join(key_text((*path, key)) for key in needed)
+            yield Problem(path, "is a table, not a number" + found(value), f"did you mean {choices}?")
         elif reason != "extra_forbidden":
             too_large = reason == "float_type" and type(value) is int
             what = _WHAT["magnitude" if too_large else reason]
@@ -114,7 +117,7 @@ def _expected(path: KeyPath, kind: type[Table]) -> str:
     if "enum" in node:
         return "one of " + ", ".join(f'"{choice}"' for choice in node["enum"])
     if node["type"] == "object":
-        required = node.get("required", []) + node.get("oneOf", [{}])[0].get("required", [])
+        required = _required(node)
         return f"the table [{key_text(path)}]" + (f" with {' and '.join(required)}" if required else "")
     if "array" in node["type"] and path in tables_within(kind):
         return f"each entry under a header of its own, {_header(path, kind)}"
@@ -125,6 +128,11 @@ def _expected(path: KeyPath, kind: type[Table]) -> str:
     else:
         text = _value(node)
     return text if node.get("unit") in (None, "1") else f"{text}, in {node['unit']}"
+
+
+def _required(node: dict[str, Any]) -> list[str]:
+    """The keys that a table needs, by its JSON Schema; of groups that exclude each other, those of the first."""
+    return [*node.get("required", []), *node.get("oneOf", [{}])[0].get("required", [])]
 
 
 def _value(node: dict[str, Any]) -> str:

@@ -1,5 +1,6 @@
 """`brakecli advise`."""
 
+from dataclasses import replace
 from typing import Annotated
 
 from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
@@ -8,7 +9,7 @@ from brakecli.front.inputs import load_case, load_study
 from brakecli.front.progress import say
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
-STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study; its case is not used."
+STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study, in place of its case."
 MARGIN = "Part of its friction by which the case is to stay stable above it."
 
 
@@ -24,7 +25,7 @@ def command(
 ) -> None:
     """What moves the critical friction, and what to change."""
     loaded = load_case(case, overrides)
-    study = load_study(scatter, None) if scatter is not None else None
+    study = replace(load_study(scatter, None), base=loaded) if scatter is not None else None
     from brakecli.analysis.stability.advice import KEYS as USUAL
     from brakecli.front.stability_tables import advice_table
     from brakecli.runs.advise import advise, advise_seconds

@@ -15,7 +15,8 @@ from brakecli.front.measured import Measured
 SOURCE = "Result of any kind; with --quantity a measured signal, as for classify."
 SELECT = "Draw the nearest value of a sweep's axis; repeatable."
 VARIABLE = (
-    "Draw this number of a sweep; of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."
+    "Draw this number of a sweep or of branches; "
+    "of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."
 )
 SECTION = (
     'Draw the Poincaré section of a run: its states once in each period of a passing "wave", '

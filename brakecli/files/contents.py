@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError, printable
-from brakecli.files.field import flat, plain
+from brakecli.files.field import flat, plain, plain_units
 from brakecli.files.fields import BRANCH, COMPARISON, LOCK_IN, RUN, SCATTER, SWEEP, WELCH
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.toml_lines import parse
@@ -30,6 +30,7 @@ _APART = {
 }
 _BLOCK = 1 << 20  # rows read at a time
 _RISING = ("time", "frequency")  # axes along which values are interpolated
+_NAMED = 3  # keys of the case in a sentence
 _ROUNDING = 1e-9  # of the largest value, which interpolation may add
 _DECLARED = {
     "run": RUN,
@@ -63,11 +64,33 @@ class Difference:
     numbers: list[dict[str, Any]]
     variables: list[dict[str, Any]]
     versions: list[dict[str, Any]]
+    judged: bool  # whether both hold a verdict
 
     @property
     def same(self) -> bool:
         """Whether there is none, but for versions."""
         return not (self.case or self.numbers or self.variables)
+
+    @property
+    def sentence(self) -> str:
+        """What differs: keys of the case, the verdict, and which variable does most, beside its largest value."""
+        if self.same:
+            return "no difference in case, numbers and variables"
+        names = [str(each["name"]) for each in self.case]
+        more = f" and {len(names) - _NAMED} more keys" if len(names) > _NAMED else ""
+        said = [f"the case differs in {', '.join(names[:_NAMED])}{more}" if names else "the case is the same"]
+        if self.judged:
+            pairs = [each for each in self.numbers if each["name"] == "regime"]
+            places = [each for each in self.variables if each["name"] == "regime" and each["different"]]
+            said += [f"the verdict differs: {each['a']} and {each['b']}" for each in pairs]
+            said += [f"the verdict differs at {each['different']} of {each['compared']} points" for each in places]
+            said += ["the verdict is the same"] * (not pairs and not places)
+        if known := [each for each in self.variables if each["relative"]]:
+            most = max(known, key=lambda each: each["relative"])
+            units = "" if most["units"] == "1" else f" {plain_units(most['units'])}"
+            size = f"{most['largest']:.3g}{units}, {most['relative']:.3g} times its largest value"
+            said.append(f"{most['name']} differs most, by up to {size}")
+        return "; ".join(said)
 
 
 def difference(a: StoredResult, b: StoredResult) -> Difference:
@@ -94,7 +117,8 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
         each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
     variables = [each for group in groups for each in _variables(a, b, group)]
     of_program = [*changed(a.versions, b.versions)]
-    return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program)
+    judged = all("regime" in {**each.attributes, **each.variables("/")} for each in (a, b))
+    return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program, judged)
 
 
 def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, Any]:

@@ -586,6 +586,7 @@ DIFFERENT_VARIABLE = (
 )
 DIFFERENCE_OF_TWO = (
     Field("same", "", "whether case, numbers and variables are the same", "?"),
+    Field("sentence", "", "what differs, in a sentence", TEXT),
     Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
     Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_NUMBER),
     Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),

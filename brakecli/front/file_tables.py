@@ -31,7 +31,7 @@ def info_table(numbers: Mapping[str, Any]) -> str:
 
 def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
     """Keys, numbers and variables that differ, each side by side."""
-    parts = []
+    parts = [_prose(numbers["sentence"])]
     for name in ("case", "numbers", "versions"):
         shown = [each for each in numbers[name] if not each["name"].startswith(_ASIDE)]
         if shown:
@@ -55,14 +55,17 @@ def diff_table(files: Mapping[str, str], numbers: Mapping[str, Any]) -> str:
         parts.append(grid(columns))
     if alike:
         named = ", ".join(f"{_place(each)} ({_shapes(each)})" for each in alike)
-        parts.append(f"the same where both have values, of different lengths: {named}")
+        parts.append(_prose(f"the same where both have values, of different lengths: {named}"))
     if along := {each["interpolated"]: None for each in numbers["variables"] if each["interpolated"]}:
         parts.append(f"compared at equal {' and '.join(along)}; the finer result is interpolated")
-    if numbers["same"]:
-        parts.append("no difference in case, numbers and variables")
     if files["output"]:
         parts.append(f"{files['output']}: written")
     return "\n\n".join(parts)
+
+
+def _prose(text: str) -> str:
+    """A sentence in lines as wide as the terminal."""
+    return grid({"": [text]}, show_header=False)
 
 
 def _text(value: Any, units: str | None = None, form: str = ".6g") -> str:

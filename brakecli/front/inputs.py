@@ -62,13 +62,16 @@ def load_study(source: str, overrides: list[str] | None) -> "LoadedStudy":
     """The study of a study file."""
     from brakecli.scattering.study import parse_study
 
-    return _over_a_case(source, overrides, parse_study)
+    return _over_a_case(source, overrides, parse_study, ", or write a study of it with: brakecli new scatter")
 
 
 def _over_a_case(
-    source: str, overrides: list[str] | None, parse: Callable[[str, str, Path, Sequence[str]], _Loaded]
+    source: str,
+    overrides: list[str] | None,
+    parse: Callable[[str, str, Path, Sequence[str]], _Loaded],
+    more: str = "",
 ) -> _Loaded:
-    """What a file holds that names its case."""
+    """What a file holds that names its case; `more` is what else to do where it is a case itself."""
     from brakecli.sweeps.plan import kind_of
 
     text, name = _text(source)
@@ -77,7 +80,7 @@ def _over_a_case(
         return parse(text, name, folder, overrides or ())
     except CaseError as error:
         if kind_of(text) == "case":
-            remedy = f"simulate it with: {command('run', source)}"
+            remedy = f"simulate it with: {command('run', source)}{more}"
             raise UsageError(f"{name}: this is a case; {remedy}") from error
         raise
 

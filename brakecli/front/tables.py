@@ -114,25 +114,28 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
 
 def verdicts_table(results: Sequence[Mapping[str, Any]]) -> str:
     """The verdicts on several files, one in a row."""
-    found = [(each, each.get("frequency")) for each in results]
-    columns = {
-        "file": [each["source"] for each, _ in found],
-        "regime": [each.get("regime", "unreadable") for each, _ in found],
-        "Hz": ["-" if frequency is None else f"{frequency:.6g}" for _, frequency in found],
-        "because": [each.get("error") or "; ".join(each["reasons"]) for each, _ in found],
-    }
-    return grid(columns)
+    because = [each.get("error") or "; ".join(each["reasons"]) for each in results]
+    regimes = [each.get("regime", "unreadable") for each in results]
+    names, tones = [each["source"] for each in results], [*map(_tone, results)]
+    return grid({"file": names, "regime": regimes, "Hz": tones, "because": because})
 
 
 def _verdict_rows(numbers: Mapping[str, Any]) -> list[Row]:
-    regime, excitation = numbers["regime"], numbers["excitation"]
+    source = f" ({numbers['excitation']})" if numbers["excitation"] != "none" else ""
     return [
-        ("regime", regime if excitation == "none" else f"{regime} ({excitation})"),
+        ("regime", numbers["regime"] + source),
         ("because", "; ".join(numbers["reasons"])),
-        *_rows(fields.VERDICT, numbers, "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
+        ("frequency", _tone(numbers, "Hz")),
+        *_rows(fields.VERDICT, numbers, "amplitude", "stick_fraction", "contact_loss_fraction"),
         *_rows(fields.VERDICT, numbers, *(name for name in IF_KNOWN if numbers.get(name) is not None)),
         ("vibrates", [_interval(each) for each in numbers.get("vibrations") or ()]),
     ]
+
+
+def _tone(numbers: Mapping[str, Any], unit: str = "") -> str:
+    """The frequency (Hz) of a motion; before it has settled it is not that of the motion which lasts."""
+    shown = text_of(numbers.get("frequency"), unit)
+    return shown if shown == "-" or numbers.get("settled", True) else f"{shown}, not settled"
 
 
 def _interval(found: Mapping[str, Any]) -> str:

@@ -8,12 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.table import Excitation
 from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.windows import Outcome
 
-_FEW = 60  # points up to which each has a marker of full size
 _DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves
 
 
@@ -43,7 +42,7 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     critical, axis = picture.critical, picture.axes[0]
     assert critical is not None
     x, value, sustained = axis.values, picture["critical"][0], picture["critical_sustained"][0]
-    eigenvalue, size = picture["critical_eigenvalue"][0], _size(x)
+    eigenvalue, size = picture["critical_eigenvalue"][0], sweep.size_of(len(x))
     marker, ms, ls = (".", 0.6 * size, "-") if axis.texts is None else ("_", 16.0, "none")
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", marker=marker, ms=ms, ls=ls)
     regained = picture["critical_status"][0] == Outcome.REGAINED
@@ -88,7 +87,7 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     x, difference = picture.axes[0].values, (picture["critical"] - picture["critical_eigenvalue"])[0]
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
     axes.axhline(0.0, color=style.DARK, lw=1.1)
-    axes.errorbar(x, difference, error, **_bars(_size(x)))
+    axes.errorbar(x, difference, error, **_bars(sweep.size_of(len(x))))
     axes.margins(y=0.15)
     highest, name = style.largest(np.abs(difference) + error), "simulation\nless eigenvalue"
     style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], name)
@@ -102,7 +101,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
     least = max(lasting / 30.0, float(values[values > 0.0].min())) if wide else 0.0
-    x, size, small = axis.values, _size(axis.values), values < least
+    x, size, small = axis.values, sweep.size_of(len(axis.values)), values < least
     shaken, none = picture["excitation"] == Excitation.FORCED, np.full_like(values, np.nan)
     forced = picture.variables.get(sweep.FORCED_PART, none) if name == "amplitude" else none
     forced = np.where(forced >= least, forced, np.nan)  # beside what the shoe adds
@@ -113,12 +112,11 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
             arrows: dict[str, Any] = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
             label = f"on the way {direction}" if direction else None
             axes.plot(x, y, color="#777777", lw=1.0, ls=dashes, label=label, **arrows)
-        for regime, (colour, marker) in sweep.REGIMES.items():
+        for order, (chosen, label, colour, marker) in enumerate(picture.kinds):
             points: dict[str, Any] = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
-            chosen = picture["regime"][number] == regime
-            axes.plot(x[chosen], y[chosen], marker=arrow or marker, ms=size, **points)
-            if ((picture["regime"] == regime) & ~died).any():  # for the legend
-                axes.plot([], [], marker="s" if direction else marker, ms=7, label=str(regime), **points)
+            axes.plot(x[chosen[number]], y[chosen[number]], marker=arrow or marker, ms=size, **points)
+            if (chosen & (~died | bool(picture.attractors))).any() and order < sweep.MOST_NAMED:  # for the legend
+                axes.plot([], [], marker="s" if direction else marker, ms=7, label=label, **points)
         waves = np.where(shaken[number], y, factor * forced[number])
         if (seen := np.isfinite(waves)).any():
             axes.plot(x[seen], waves[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
@@ -144,7 +142,9 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         style.set_ticks(axes.yaxis, 0.5 * floor, 2.0 * highest)
     else:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
-    rest = sweep.sign(died, "damped: nothing lasts", ".", sweep.REGIMES[Regime.DAMPED][0], style.DARK)
+    _, nothing, colour, _ = next(picture.kinds)  # steady sliding is the first attractor
+    nothing = nothing if picture.attractors else "damped: nothing lasts"
+    rest = sweep.sign(died, nothing, ".", colour, style.DARK)
     _mark(axes, x, [sweep.sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed(), rest])
 
 
@@ -167,11 +167,9 @@ def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:
     for chosen, look in there:
         height = np.full(int(chosen.sum()), 0.965 if look["marker"] == "^" else 0.035)
         transform = axes.get_xaxis_transform()
-        axes.plot(x[chosen], height, clip_on=False, zorder=3, ms=_size(x), transform=transform, **look)
-
-
-def _size(points: style.Array) -> float:
-    return float(max(2.0, 6.5 * min(1.0, _FEW / len(points)) ** 0.5))
+        axes.plot(
+            x[chosen], height, ms=sweep.size_of(len(x)), clip_on=False, zorder=3, transform=transform, **look
+        )
 
 
 def _bars(size: float) -> dict[str, Any]:

@@ -5,7 +5,6 @@ from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, LogNorm, Normalize
@@ -18,12 +17,12 @@ from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.point import Status
 
-_MOST_NAMED = 12  # attractors in the legend: the first of them
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
 _MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
 _EMPTY = "#F7F7F7"  # of cells without a value
 _ALIKE = 1e-6  # relative difference of numbers from which on they have different colours
+_DOT = 8.0  # points (1/72 inch) across, of a listed point
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
 
@@ -127,7 +126,7 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
     signs += [(picture["regime"] == Regime.UNDECIDED, open_), picture.failed()]
     look: dict[str, Any] = {"cmap": colours, "vmin": -0.5, "vmax": len(sweep.REGIMES) - 0.5}
     mesh = _mesh(axes, picture, codes, *signs, **look)
-    x, y = picture.axes
+    x, y = (axis for axis, _ in picture.plane)
     if sweep.MARGIN in picture.variables and min(map(len, (x.values, y.values))) > 1 and not (x.texts or y.texts):
         margin = np.ma.masked_invalid(picture[sweep.MARGIN][0].T)
         if margin.min() < 0.0 < margin.max():
@@ -138,12 +137,12 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
 
 
 def _draw_attractors(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
-    """A colour for each attractor, the darker the larger its number: they are told apart in grey as well."""
+    """A colour for each attractor; the legend says what it is."""
     numbers, count = picture[sweep.ATTRACTOR], len(picture.attractors)
-    colours = ListedColormap(colormaps["cividis_r"](np.linspace(0.05, 0.95, count)))
-    for number, label in enumerate(picture.attractors[:_MOST_NAMED]):
+    colours = ListedColormap(sweep.shades(count))
+    for number, label in enumerate(picture.attractors[: sweep.MOST_NAMED]):
         axes.plot([], [], "s", ms=9, mfc=colours(number), mec="none", label=label)
-    open_ = {"marker": "x", "color": style.DARK, "label": "no attractor known"}
+    open_ = {"marker": "x", "color": style.DARK, "label": sweep.UNKNOWN}
     nothing = (numbers == 0) & (picture["status"] == Status.DONE)
     values = np.where(numbers > 0, numbers, np.nan)
     return _mesh(
@@ -167,6 +166,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     elsewhere = {"marker": "d", "color": style.VERMILION, "mec": "white", "label": label}
     signs = (picture.differs(), elsewhere), *picture.missing()
     mesh = _mesh(axes, picture, scale.factor * picture["critical"], *signs, cmap="cividis", norm=scale.norm)
+    if picture.listed:
+        return mesh
     values = scale.factor * picture["critical"][0]
     known = np.isfinite(values)
     areas = known[1:, 1:] & known[:-1, 1:] & known[1:, :-1] & known[:-1, :-1]
@@ -184,22 +185,33 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
 
 
 def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, **look: Any) -> ScalarMappable:
-    """A cell around each point, in the colour of its value, none where it is missing; with signs in the middle."""
-    x, y = picture.axes
+    """A cell around each point, in the colour of its value, none where it is missing; with signs in the middle.
+
+    Listed points fill no grid: each is a dot.
+    """
+    (x, across), (y, up) = picture.plane
     x.apply_to(axes.xaxis)
     y.apply_to(axes.yaxis)
-    axes.grid(False)
-    axes.set_facecolor(_EMPTY)
-    drawn = np.ma.masked_invalid(values[0].T)
-    seams = {"edgecolors": "white", "linewidth": 0.4} if drawn.size <= 1000 else {"edgecolors": "face"}
-    mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=drawn.size > _MOST_DRAWN)
-    axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
-    box, scale = axes.get_window_extent(), 72.0 / float(axes.figure.dpi)  # signs are small where cells are small
-    size = float(np.clip(0.4 * min(box.width / len(x.values), box.height / len(y.values)) * scale, 1.0, 7.0))
+    if picture.listed:
+        size = sweep.size_of(values.size, _DOT)
+        dots: dict[str, Any] = {"s": size**2, "linewidths": 0.6}
+        drawn = np.ma.masked_invalid(values[0])
+        none = np.ma.getmaskarray(drawn)
+        axes.scatter(across[none], up[none], fc=_EMPTY, ec=style.GREY, **dots)
+        mesh: ScalarMappable = axes.scatter(across, up, c=drawn, ec=style.DARK, **dots, **look)
+        size *= 0.6
+    else:
+        axes.grid(False)
+        axes.set_facecolor(_EMPTY)
+        drawn = np.ma.masked_invalid(values[0].T)
+        seams = {"edgecolors": "white", "linewidth": 0.4} if drawn.size <= 1000 else {"edgecolors": "face"}
+        mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=drawn.size > _MOST_DRAWN)
+        axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
+        box, scale = axes.get_window_extent(), 72.0 / float(axes.figure.dpi)  # signs are small where cells are
+        size = float(np.clip(0.4 * min(box.width / len(x.values), box.height / len(y.values)) * scale, 1.0, 7.0))
     for where, sign in signs:
         if where.any():  # drawn above contours
-            i, j = np.nonzero(where[0])
-            axes.plot(x.values[i], y.values[j], **{"ls": "none", "ms": size, "zorder": 2.1, **sign})
+            axes.plot(across[where[0]], up[where[0]], **{"ls": "none", "ms": size, "zorder": 2.1, **sign})
     return mesh
 
 

@@ -74,7 +74,7 @@ def _opened(
 
 def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", section: str = "") -> "Figure":
     """The picture of an open result, drawn with the style that is set."""
-    from brakecli.plots import branch, comparison, curves, lock_in, maps, run, scatter, sweep
+    from brakecli.plots import branch, comparison, curves, gather, lock_in, maps, run, scatter
     from brakecli.plots import section as sections
 
     kind = str(result.attributes.get("kind"))
@@ -88,11 +88,11 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
             f"{argument('section')} {section}: {what}; leave {'it' if kind != 'run' else argument('variable')} out"
         )
     if kind == "sweep":
-        picture = sweep.gather(result, select, variable)
-        return curves.draw(picture) if len(picture.axes) == 1 else maps.draw(picture)
+        picture = gather.gather(result, select, variable)
+        return curves.draw(picture) if len(picture.axes) == 1 and not picture.listed else maps.draw(picture)
     others = {"comparison": comparison.draw, "stability": lock_in.draw}
-    others |= {"branch": branch.draw, "scatter": scatter.draw}
-    if kind != "run" and kind not in others:
+    others |= {"scatter": scatter.draw}
+    if kind not in ("run", "branch", *others):
         known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
@@ -103,8 +103,10 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
         return sections.draw(result, section)
     if kind == "run":
         return run.draw(run.RunPicture(result, variable or "vx"))
+    if kind == "branch":
+        return branch.draw(result, variable)
     if variable:
-        raise UsageError(
-            f"{result.path}: {argument('variable')} is for runs and sweeps (found {variable!r}); leave it out"
-        )
+        known = "runs, sweeps and branches"
+        what = f"{argument('variable')} is for {known} (found {variable!r})"
+        raise UsageError(f"{result.path}: {what}; leave it out")
     return others[kind](result)

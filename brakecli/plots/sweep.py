@@ -1,27 +1,20 @@
 """What curves and maps of a sweep share: numbers over rising axes, missing ones as NaN; heading, legend, looks."""
 
-import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
 from brakecli.analysis.regime.table import Excitation, Regime
-from brakecli.case.read import parse_table
-from brakecli.errors import CaseError, UsageError
-from brakecli.faces import argument
-from brakecli.files import fields
-from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.axis import Axis
-from brakecli.sweeps.margin import margins
-from brakecli.sweeps.plan import Plan, label
 from brakecli.sweeps.point import Status
-from brakecli.sweeps.tables import Critical, Sweep
+from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome
 
 REGIMES = {  # colour and marker
@@ -33,15 +26,13 @@ REGIMES = {  # colour and marker
 MARGIN = "margin"  # critical friction less friction, where the picture shows its zero
 FORCED, DIFFERENT = "forced by the wheel's waves", "up and down differ"
 CRITICAL_LINE = "critical friction"
+UNKNOWN = "no attractor known"
+_FEW = 60  # points up to which each has a marker of full size
+MOST_NAMED = 12  # attractors in the legend: the first of them
+_FORMS = "osD^vPh*<>"  # markers of attractors, in turn
 WIDTH = 8.8  # inches, of a figure with one column of panels
 MOST_PANELS = 5  # values of a third axis: its maps stand side by side
-_NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")
-_CRITICAL = (
-    *("critical_status", "critical", "critical_lower", "critical_upper", "critical_error"),
-    *("critical_eigenvalue", "critical_sustained", "sustained_status"),
-)
 FORCED_PART, ATTRACTOR = "amplitude_forced", "attractor"
-_WINDOWS = ("critical_windows_lower", "critical_windows_upper")
 _FIRST = (*map(str, REGIMES), "by simulation", "with its error bar", "by eigenvalues")  # in the legend
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
@@ -67,6 +58,7 @@ class SweepPicture:
     critical: Critical | None
     shown: str = ""  # the variable that is asked for
     attractors: tuple[str, ...] = ()  # of a sweep over initial states: what each is, in words
+    listed: tuple[tuple[Axis, style.Array], ...] = ()  # keys of listed points, and where along each they lie
 
     def __getitem__(self, name: str) -> style.Array:
         """A variable."""
@@ -76,6 +68,34 @@ class SweepPicture:
         """Where nothing lasts: amplitude and frequency there are those of a rest that dies out."""
         dies = (self["regime"] == Regime.DAMPED) & (self["excitation"] == Excitation.NONE)
         return dies if name in ("amplitude", "frequency") else np.zeros_like(dies)
+
+    @property
+    def plane(self) -> tuple[tuple[Axis, style.Array], ...]:
+        """Both axes of a map, and where along each of them the points lie."""
+        if self.listed:
+            return self.listed[:2]
+        places = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
+        return tuple(zip(self.axes, places, strict=True))
+
+    def named(self, place: Sequence[Any]) -> str:
+        """The keys of a point with their values, by its place along each axis."""
+        if self.listed:
+            at = [(axis, int(np.searchsorted(axis.values, along[place[0]]))) for axis, along in self.listed]
+        else:
+            at = [*zip(self.axes, map(int, place), strict=True)]
+        return ", ".join(axis.named(where) for axis, where in at)
+
+    @property
+    def kinds(self) -> Iterator[tuple[style.Array, str, str, str]]:
+        """Points by their attractor, otherwise by their regime: which they are, label, colour and marker."""
+        for regime, look in {} if self.attractors else REGIMES.items():
+            yield self["regime"] == regime, str(regime), *look
+        colours = map(to_hex, shades(len(self.attractors)))
+        for number, (words, colour) in enumerate(zip(self.attractors, colours, strict=True)):
+            yield self[ATTRACTOR] == number + 1, words, colour, _FORMS[number % len(_FORMS)]
+        if self.attractors:
+            unknown = (self[ATTRACTOR] == 0) & (self["status"] == Status.DONE)
+            yield unknown, UNKNOWN, *REGIMES[Regime.UNDECIDED]
 
     @property
     def summary(self) -> str:
@@ -155,6 +175,16 @@ def sign(where: style.Array, label: str, marker: str, colour: str, face: str) ->
     return where, {"ls": "none", "label": label, "marker": marker, "mec": colour, "mfc": face, "mew": 1.2}
 
 
+def size_of(points: int, largest: float = 6.5) -> float:
+    """The size of markers (1/72 inch), smaller where there are many points."""
+    return float(max(2.0, largest * min(1.0, _FEW / points) ** 0.5))
+
+
+def shades(count: int) -> style.Array:
+    """A colour for each attractor, the darker the larger its number: they are told apart in grey as well."""
+    return np.asarray(colormaps["cividis_r"](np.linspace(0.05, 0.95, count)))
+
+
 def add_legend(figure: Figure) -> None:
     """Add all labels in as few rows as fit between the heading and the panels."""
     artists = style.labels(figure)
@@ -174,147 +204,3 @@ def add_legend(figure: Figure) -> None:
     figure.legend([artists[text] for text in texts], texts, **look).set_in_layout(False)
     taken = (0.19 * -(-len(texts) // columns) + 0.09) / height
     engine.set(rect=(left, bottom, wide, high - taken))
-
-
-def gather(
-    result: StoredResult, select: Sequence[str] = (), shown: str = "", more: Sequence[str] = ()
-) -> SweepPicture:
-    """Read from a result what its picture shows: the variable that is `shown`, if it is named, and `more` of them.
-
-    `select` holds `KEY=VALUE`; axes of a single value are selected anyway. Raises UnreadableResultError where
-    something is missing, UsageError where there is no such key, value or variable.
-    """
-    try:
-        sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
-    except CaseError as error:
-        raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
-    known, variables = result.variables("/"), _variables(result, sweep, shown, more)
-    dims = known["status"].dims
-    both = dims[:1] == ("direction",)
-    units = {name: style.unit_of(each.attributes) for name, each in known.items()}
-    long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
-    axes = []
-    for number, dimension in enumerate(dims[both:], start=1):
-        values = result.read("/", dimension)
-        texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
-        order = np.arange(len(values)) if texts else np.argsort(values, kind="stable")
-        places = (order if texts else values[order]).astype(np.float64)
-        axes.append(Axis(dimension, long_names[dimension], units[dimension], places, texts))
-        variables = {name: np.take(values, order, number) for name, values in variables.items()}
-    title = str(result.attributes.get("title", "")) or "Sweep without a title"
-    findings = tuple(map(str, result.attributes.get("findings", ())))
-    way = next((axis.direction for axis in sweep.axis if axis.direction), "")
-    ways = ("up", "down") if both else (way,)
-    picture = SweepPicture(
-        title, findings, (), ways, tuple(axes), variables, units, long_names, sweep.critical, shown
-    )
-    if ATTRACTOR in known:
-        picture = replace(picture, attractors=tuple(_attractors(variables)))
-    for wanted in select:  # findings about the whole sweep need not hold for a part of it
-        picture = replace(_selected(picture, wanted, result), findings=())
-    for axis in picture.axes:
-        if len(axis.values) == 1:
-            picture = picture.at(picture.axes.index(axis), 0)
-    _check_drawable(picture, result)
-    return picture
-
-
-def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[str]) -> dict[str, style.Array]:
-    """What is drawn of the points, over the directions and the axes as they lie in the file."""
-    known = result.variables("/")
-    names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
-    if missing := [name for name in names if name not in known]:
-        raise style.unreadable(result, f"it has no variable {missing[0]}")
-    if len({(known[name].dims, known[name].shape) for name in names}) != 1:
-        raise style.unreadable(result, "its variables do not lie on the same axes")
-    dims = known["status"].dims
-    both = dims[:1] == ("direction",)
-
-    def read(name: str) -> style.Array:
-        return style.read_column(result, name)[... if both else np.newaxis]
-
-    variables = {name: read(name) for name in names}
-    shape = variables["status"].shape
-    for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
-        there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
-        variables[name] = read(name) if there else np.full((*shape, 1), np.nan)
-    if shown and shown not in (able := numeric(result)):
-        problem = f"{argument('variable')} {shown}: no number of its points has this name"
-        raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
-    base = str(result.attributes.get("resolved_toml", ""))
-    margin = None
-    with suppress(CaseError, ValueError, RecursionError):  # of older results, and of forged ones
-        margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
-    if margin is not None and margin.size == np.prod(shape[1:]):
-        variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)
-    for name in {shown, *more, *({FORCED_PART, ATTRACTOR} & {*known})} - {"", *variables}:
-        values = read(name)
-        nothing = np.nan if values.dtype.kind in "if" else ""
-        variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
-    for name in ("regime", "excitation"):  # those of points that failed mean nothing
-        variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
-    differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
-    variables["hysteresis"] = np.broadcast_to(differ, shape)
-    return variables
-
-
-def _attractors(variables: Mapping[str, style.Array]) -> Iterator[str]:
-    """Number, regime, frequency, amplitude and share of each attractor, by its points."""
-    numbers = variables[ATTRACTOR]
-    for number in range(1, int(np.nanmax(numbers, initial=0)) + 1):
-        here = numbers == number
-        regimes, counts = np.unique(variables["regime"][here], return_counts=True)
-        regime, share = str(regimes[counts.argmax()]), float(here.mean())
-        frequency, amplitude = (float(np.median(variables[name][here])) for name in ("frequency", "amplitude"))
-        if np.all(variables["excitation"][here] == Excitation.NONE):
-            amplitude = 0.0  # what dies comes to steady sliding
-        factor, unit = style.prefixed(amplitude, "m")
-        tone = f", {frequency:.4g} Hz" if frequency > 0.0 else ""
-        size = f", {factor * amplitude:.3g} {unit}" if amplitude else ""
-        yield f"{number}: {regime}{tone}{size}, {share:.1%} of the points"
-
-
-def numeric(result: StoredResult) -> list[str]:
-    """The variables of a sweep that hold a number for each point."""
-    known = result.variables("/")
-    dims = known["status"].dims
-    return [name for name, each in known.items() if each.dims == dims and name not in dims and each.kind in "if"]
-
-
-def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
-    key, _, value = (part.strip() for part in wanted.partition("="))
-    value, both = value.strip("\"'"), len(picture.directions) > 1
-    problem, choices = "no axis has this key or value", [axis.key for axis in picture.axes] + both * ["direction"]
-    if key == "direction" and both:
-        if value in picture.directions:
-            return picture.towards(value)
-        choices = [*picture.directions]
-    for number, axis in enumerate(picture.axes):
-        if key in (axis.dimension, *axis.key.split(", ")):
-            if (place := axis.place(value)) is not None:
-                picture = picture.at(number, place)
-                same = axis.texts or style.readable(float(axis.values[place])) == style.readable(float(value))
-                note = "" if same else f" (nearest to {value})"
-                return replace(picture, chosen=(*picture.chosen[:-1], picture.chosen[-1] + note))
-            problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
-    some = textwrap.shorten(", ".join(choices), 120, placeholder=" …")
-    remedy = f"give one of {some}, as KEY=VALUE" if choices else "leave it out"
-    raise UsageError(f"{result.path}: {argument('select')} {wanted}: {problem}; {remedy}")
-
-
-def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:
-    """Raise UsageError where there are no axes to draw along, or too many, or too long ones."""
-    count, both = len(picture.axes), len(picture.directions) > 1
-    keys = ", ".join([axis.key for axis in picture.axes] + both * ["direction"])
-    least = min((len(axis.values) for axis in picture.axes), default=0)
-    remedy = f"draw a part of it with {argument('select')} KEY=VALUE for one of {keys}"
-    if count == 0:
-        problem = "a single point makes no picture"
-        remedy = "sweep along an [[axis]] of two values or more, or read the point's numbers in the file"
-    elif count + both > 3:
-        problem = f"{count} axes{' in two directions' if both else ''} are too many for one picture"
-    elif count == 3 and least > MOST_PANELS:
-        problem = f"one of three axes may have {MOST_PANELS} values at most, and the shortest has {least}"
-    else:
-        return
-    raise UsageError(f"{result.path}: {problem}; {remedy}")

@@ -16,10 +16,11 @@ from brakecli.files.field import Field
 from brakecli.files.read import StoredResult
 from brakecli.files.write import FILL
 from brakecli.plots import style
+from brakecli.plots.gather import gather, numeric
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.plots.scatter import NAMES
-from brakecli.plots.sweep import SweepPicture, gather, numeric
+from brakecli.plots.sweep import SweepPicture
 from brakecli.reports.blocks import (
     Code,
     Numbers,
@@ -126,7 +127,7 @@ def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
     said += (f"Attractor {each}." for each in found.attractors)
     if np.isfinite(values).any():
         place = np.unravel_index(end(values), values.shape)
-        where = ", ".join(axis.named(int(at)) for axis, at in zip(found.axes, place[1:], strict=True))
+        where = found.named(place[1:])
         value = float(f"{values[place]:.4g}")
         said.append(f"The {words} is {shown(value, found.units[name])}, at {where}.")
         numbers |= {words: (value, found.units[name]), f"{words} at": (where, "")}

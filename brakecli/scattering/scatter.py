@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.probability import Probability
 from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem
 from brakecli.files import fields
@@ -127,15 +128,20 @@ def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, Any] | Non
     try:
         return sweep_of({"case": GIVEN, "points": GIVEN, **(tables or {})}, loaded.base, listed)
     except CaseError as error:
-        raise CaseError([_of_sample(each, loaded.name) for each in error.problems]) from error
+        raise CaseError([_of_sample(each, loaded) for each in error.problems]) from error
 
 
-def _of_sample(problem: Problem, name: str) -> Problem:
-    """What is wrong with a sample: with its value, or with the key that it sets."""
-    if problem.what.startswith("is out of range"):
+def _of_sample(problem: Problem, loaded: LoadedStudy) -> Problem:
+    """What is wrong with a sample, at the line of the parameter that sets it."""
+    paths = [[*map(key_path, each.paths)] for each in loaded.given.parameter]
+    if (number := next((n for n, each in enumerate(paths) if problem.path in each), None)) is None:
+        return replace(problem, source=loaded.name)
+    if (law := loaded.study.parameter[number].distribution) in ("uniform", "triangular"):
+        remedy = f"{problem.remedy}: a {law} distribution reaches √{3 if law == 'uniform' else 6} deviations far"
+    else:
         remedy = "cut its distribution off: give low and high beside mean and deviation"
-        return replace(problem, source=f"{name}: {problem.source.replace('point', 'sample')}", remedy=remedy)
-    return replace(problem, source=name)
+    what = f"{problem.key} {problem.what} at {problem.source.replace('point', 'sample')}"
+    return loaded.at(number, Problem((), what, remedy))
 
 
 def scatter(

@@ -1,22 +1,24 @@
 """A study's tables: which keys scatter, how, and how samples are drawn."""
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
 import tomli_w
-from pydantic import Field
+from pydantic import Field, ValidationError
 from scipy import stats
 
 from brakecli.analysis.stability.advice import numbers
+from brakecli.case import wording
 from brakecli.case.case import Case
-from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, read_text
-from brakecli.case.tables import MISSING, Number, Positive, Table, Title, described, from_list
-from brakecli.errors import CaseError, Problem, found
+from brakecli.case.read import LoadedCase, key_path, parse_over_case, put
+from brakecli.case.tables import MISSING, Number, OverCase, Positive, Table, described, from_list, key_schema
+from brakecli.errors import CaseError, KeyPath, Problem, found
+from brakecli.files.toml_lines import innermost
 from brakecli.solver.compile import Floats
 
 SCRAMBLINGS = 8
@@ -26,6 +28,7 @@ _LIMIT = 3.0  # deviations from the mean to a limit, where only limits are given
 _RARE = 1.35e-3  # probability beyond three deviations of a normal distribution
 _LEAST_EIGENVALUE = 1e-9
 _LEAST_KEPT = 1e-12  # probability between limits
+_NUMBERS = ("low", "high", "mean", "deviation", "tolerance_percent")
 
 
 class Parameter(Table):
@@ -42,6 +45,9 @@ class Parameter(Table):
     high: Number | None = described("largest value", None)
     mean: Number | None = described("mean", None)
     deviation: Positive | None = described("standard deviation", None)
+    tolerance_percent: Positive | None = described(
+        "in place of low and high: how many per cent they lie below and above the value of the case", None
+    )
     mode: Number | None = described('where "triangular" is likeliest; the middle if left out', None)
 
     @property
@@ -51,18 +57,22 @@ class Parameter(Table):
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
+        given = [name for name in _NUMBERS if getattr(self, name) is not None]
         for name in ("key", "keys"):
             for text in self.paths if getattr(self, name) is not None else ():
-                if not key_path(text):
-                    yield Problem((name,), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+                yield from self._wrong_key(name, text)
         normal = self.distribution == "normal"
         bounded, spread = self.distribution in ("uniform", "triangular"), self.mean is not None
         for one, other in (("low", "high"), ("mean", "deviation")):
-            alone = [name for name in (one, other) if getattr(self, name) is not None]
+            alone = [name for name in (one, other) if name in given]
             if len(alone) == 1:
                 yield self.wrong(alone[0], "is given alone", f"give {one} and {other} together")
-        if self.low is None and self.mean is None:
-            yield Problem(("low",), "is missing", "give low and high, or mean and deviation", instead=("mean",))
+        if not given:
+            remedy = "give low and high, mean and deviation, or tolerance_percent"
+            yield Problem(("low",), MISSING, remedy, instead=_NUMBERS)
+        if self.tolerance_percent is not None and len(given) > 1:
+            others = " and ".join(given[:-1])
+            yield self.wrong("tolerance_percent", f"is given together with {others}", "keep one of the two")
         if bounded and spread and self.low is not None:
             yield self.wrong("mean", "is given together with low and high", "keep one of the two")
         if self.low is not None and self.high is not None and not self.low < self.high:
@@ -84,6 +94,53 @@ class Parameter(Table):
                 value = getattr(self, name)
                 if value is not None and value <= 0.0:
                     yield self.wrong(name, "is not above 0", "a lognormal value is above 0")
+
+    def _wrong_key(self, name: str, text: str) -> Iterator[Problem]:
+        """What is wrong with a key path, and with the limits, or the mean, that it is to take."""
+        path = key_path(text)
+        if not path:
+            yield Problem((name,), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+            return
+        unknown = False
+        try:
+            key_schema(Case, path)
+        except KeyError:
+            unknown = True
+        limits = {each: getattr(self, each) for each in ("low", "high", "mean")}
+        values = {each: value for each, value in limits.items() if value is not None}
+        for where, value in list({name: 0.0}.items() if unknown else values.items())[:2]:
+            data: dict[str, Any] = {}
+            put(data, path, value, Case, kept=())
+            try:
+                Case.model_validate(data)
+            except ValidationError as error:
+                wrong = [each for each in wording.problems(error, Case) if each.path == path[: len(each.path)]]
+                for each in wrong:
+                    yield Problem((where,), f"{text} {'is unknown' if unknown else each.what}", each.remedy)
+                if wrong:
+                    return
+
+    def over(self, case: Case) -> "Parameter":
+        """The same with its limits, where they are given in per cent of the case's values; raises CaseError."""
+        if self.tolerance_percent is None:
+            return self
+        own = dict.fromkeys(numbers(case).get(key_path(text)) for text in self.paths)
+        (value, *others), remedy = own, "give low and high"
+        if others:
+            what = f"{', '.join(self.paths)} differ in the case: {', '.join(map(str, own))}"
+        elif not isinstance(value, float) or not value:
+            what = f"{', '.join(self.paths)} {'is 0' if value == 0.0 else 'has no value'} in the case"
+        else:
+            part = 0.01 * self.tolerance_percent
+            low, high = sorted((value * (1.0 - part), value * (1.0 + part)))
+            data = {**self.model_dump(exclude_none=True), "low": low, "high": high}
+            del data["tolerance_percent"]
+            try:
+                return Parameter.model_validate(data)
+            except ValidationError as error:
+                wrong = wording.problems(error, Parameter)
+                raise CaseError([replace(each, path=("tolerance_percent",)) for each in wrong]) from None
+        raise CaseError([self.wrong("tolerance_percent", f"is part of nothing: {what}", remedy)])
 
     @cached_property
     def _law(self) -> tuple[Any, float, float, bool]:
@@ -139,11 +196,9 @@ class Parameter(Table):
 _Row = Annotated[tuple[Number, ...], *from_list]
 
 
-class Study(Table):
+class Study(OverCase):
     """A case whose keys scatter, and what is asked of it."""
 
-    title: Title = ""
-    case: str = described("the case's file, seen from the study's own", min_length=1)
     samples: Annotated[int, Field(ge=SCRAMBLINGS, le=MOST_SAMPLES)] = described("how many brakes are drawn", 1024)
     seed: Annotated[int, Field(ge=0)] = described("of the random numbers", 0)
     sampling: Literal["sobol", "latin-hypercube", "random"] = described("how samples are drawn", "sobol")
@@ -209,10 +264,29 @@ class Study(Table):
 class LoadedStudy:
     """A study with the text that it was read from, and its case."""
 
-    study: Study
+    given: Study
     text: str
     base: LoadedCase
     name: str  # of its file
+    lines: Mapping[KeyPath, int]  # of its keys
+
+    @cached_property
+    def study(self) -> Study:
+        """The study with its limits; raises CaseError."""
+        laws, wrong = list[Parameter](), list[Problem]()
+        for number, each in enumerate(self.given.parameter):
+            try:
+                laws.append(each.over(self.base.case))
+            except CaseError as error:
+                wrong += (self.at(number, problem) for problem in error.problems)
+        if wrong:
+            raise CaseError(wrong)
+        return self.given.model_copy(update={"parameter": tuple(laws)})
+
+    def at(self, number: int, problem: Problem) -> Problem:
+        """The problem of a parameter, with its line."""
+        path = ("parameter", number, *problem.path)
+        return replace(problem, path=path, source=self.name, line=innermost(self.lines, path, 0))
 
     def beside(self, case: Case) -> list[str]:
         """Sentences on values of a drawing that lie beside all samples."""
@@ -237,15 +311,7 @@ def parse_study(text: str, name: str, folder: Path, overrides: Sequence[str] = (
 
     Overrides of its own keys belong to the study, all others to its case.
     """
-    own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in _OWN]
-    study = parse_table(Study, text, name, own)
-    try:
-        case_text, source = read_text(str(folder / study.case))
-    except CaseError as error:
-        wrong = (Problem(("case",), f"{each.where} {each.what}", each.remedy, name) for each in error.problems)
-        raise CaseError([*wrong]) from error
-    base = parse_case(case_text, source, [each for each in overrides if each not in own])
-    return LoadedStudy(study, text, base, name)
-
-
-_OWN = {(key,) for key in Study.model_fields if key != "title"}
+    given, base, lines = parse_over_case(Study, text, name, folder, overrides, {*Study.model_fields} - {"title"})
+    loaded = LoadedStudy(given, text, base, name, lines)
+    assert loaded.study  # its limits are known
+    return loaded

@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from brakecli.case import wording
 from brakecli.case.case import Case, given_toml
-from brakecli.case.read import LoadedCase, key_path, parse_case, parse_table, put, read_text
+from brakecli.case.read import LoadedCase, key_path, parse_over_case, parse_table, put
 from brakecli.case.roughness import Record, Records, reading
 from brakecli.case.tables import Table
 from brakecli.errors import CaseError, KeyPath, Problem
@@ -160,18 +160,10 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
 
     Overrides of `critical` and `case` belong to the sweep, all others to its base case.
     """
-    own = [each for each in overrides if key_path(each.partition("=")[0])[:1] in (("case",), ("critical",))]
-    sweep = parse_table(Sweep, text, name, own)
-    others = [override for override in overrides if override not in own]
-    try:
-        case_text, source = read_text(str(folder / sweep.case))
-    except CaseError as error:
-        at = Problem(("case",), "", "", name, innermost(Located(text, name).lines, ("case",), 0))
-        wrong = (replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems)
-        raise CaseError([*wrong]) from error
-    base, listed = parse_case(case_text, source, others), None
+    sweep, base, lines = parse_over_case(Sweep, text, name, folder, overrides, {"case", "critical"})
+    listed = None
     if sweep.points is not None:
-        listed = read_listed(folder / sweep.points, name, innermost(Located(text, name).lines, ("points",), 0))
+        listed = read_listed(folder / sweep.points, name, lines.get(("points",), 0))
         if sweep.critical is not None and key_path(sweep.critical.parameter) in map(key_path, listed.keys):
             remedy = "look for another parameter, or leave that column out"
             raise CaseError([Problem(("critical", "parameter"), "is set by a column of points", remedy, name)])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.case.case import Case
+from brakecli.case.case import SETTLED, Case
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema
@@ -63,6 +63,7 @@ class Findings:
             self.hysteresis, self.sentences = _hysteresis(journal)
         self.sentences += on_short_runs(journal)
         self.sentences += _on_undecided(journal)
+        self.sentences += _on_settled(journal)
         if plan.sweep.critical is not None:
             values = journal.column("critical")
             known = values[~np.isnan(values)]
@@ -122,9 +123,10 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     for axis in plan.sweep.axis:
         _write_along(result, axis.name, axis.parameter, axis.name, _values(axis))
     if plan.listed is not None:
-        result.axis("/", fields.LISTED_POINT, np.arange(plan.points))
-        for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True):
-            _write_along(result, key.replace(".", "_"), [key], fields.LISTED_POINT.name, column)
+        keys, point = plan.listed.keys, fields.LISTED_POINT
+        result.variable("/", point, (point.name,), np.arange(plan.points), parameters=[*keys])
+        for key, column in zip(keys, plan.listed.columns, strict=True):
+            _write_along(result, key.replace(".", "_"), [key], point.name, column)
     elif not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
     windows, critical = 0, plan.sweep.critical
@@ -225,9 +227,31 @@ def _on_undecided(journal: Journal) -> Iterator[str]:
         alike.setdefault(_NUMBER.sub("", each.decode()), []).append(each.decode())
     most = max(alike.values(), key=len)
     longest = max(most, key=lambda text: float(found[1]) if (found := _LONGER.search(text)) else 0.0)
-    by_itself = journal.plan.case({}).solver.duration == "settled"
+    by_itself = journal.plan.case({}).solver.duration == SETTLED
     remedy = '; solver.duration = "settled" runs as long as each needs' * ("run " in longest and not by_itself)
     yield f"{count} of {size} points are undecided, {len(most)} of them: {longest}{remedy}"
+
+
+def _on_settled(journal: Journal) -> Iterator[str]:
+    """How many points that run as long as they need have settled, and how long they ran."""
+    plan, size = journal.plan, journal.column("status").size
+    if plan.sweep.critical is not None or ("solver", "duration") in plan.settings(0):
+        return
+    if plan.case({}).solver.duration != SETTLED:
+        return
+    done, seconds = journal.column("status") == _DONE, journal.column("duration")
+    lasts = journal.column("excitation") != b"none"
+    settled = done & (journal.column("regime") != b"undecided") & (~lasts | (journal.column("settled") == 1))
+
+    def ran(which: NDArray[np.bool_]) -> str:
+        ends = dict.fromkeys(f"{end:.4g}" for end in (seconds[which].min(), seconds[which].max()))
+        return f"{' to '.join(ends)} s"
+
+    count = f"all {size}" if settled.all() else f"{int(settled.sum())} of {size}"
+    said = f"{count} points have settled" + (f", in {ran(settled)}" if settled.any() else "")
+    yield said + (
+        f"; others ran for {ran(rest)}, and their reasons say more" if (rest := done & ~settled).any() else ""
+    )
 
 
 def _ends_of_loop(plan: Plan, lasts: NDArray[Any]) -> str:

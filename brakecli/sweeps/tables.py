@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field
 
 from brakecli.case.read import key_path
-from brakecli.case.tables import MISSING, Number, Positive, Table, Title, described, from_list
+from brakecli.case.tables import MISSING, Number, OverCase, Positive, Table, described, from_list
 from brakecli.errors import Problem, found
 
 
@@ -103,11 +103,9 @@ class Critical(Table):
         yield from _not_key_paths(self.parameter)
 
 
-class Sweep(Table):
+class Sweep(OverCase):
     """A grid of cases around a base case, and what to find at each of them."""
 
-    title: Title = ""
-    case: str = described("the base case's file, seen from the sweep's own", min_length=1)
     axis: Annotated[tuple[Axis, ...], *from_list] = described("the axes of the grid; the last varies fastest", ())
     points: str | None = described(
         "a table of points in place of axes, .csv, seen from the sweep's own file: a column for each key path",

@@ -211,3 +211,14 @@ def test_where_theory_does_not_know_the_growth_neighbours_decide_and_say_how_fas
         assert found.row == row
         assert word in found.sentence
         assert "nan" not in found.sentence
+
+
+def test_a_row_whose_remedy_is_a_longer_run_says_so_to_runs_that_settle() -> None:
+    rows = [*CONTACT, *SMOOTH, *ROUGH, *LOOKS]
+    asked = {row.name for row in rows if "run " in row.remedy}
+    named = {row.name for row in rows if row.longer}
+    assert asked < named
+    assert named - asked == {"either", "nothing moves yet"}
+    (rests,) = (row for row in rows if row.name == "nothing moves yet")
+    grows = Answers(growth=10.0, duration=1.0)
+    assert [rests.decision(replace(grows, duration=each)).longer for each in (1.0, 1e3)] == [True, False]

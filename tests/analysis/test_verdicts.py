@@ -153,22 +153,25 @@ def test_a_drum_that_swings_once_per_turn_is_forced_with_the_amplitude_that_last
     assert verdict.torque_variation == pytest.approx(0.5 * force, rel=0.02)
 
 
+RINGS: dict[str, Any] = {
+    "shoe": {"mass": 2.1},
+    "wheel": {"radius": 0.1, "angular_speed": 1.575},
+    "link1": {"stiffness": 5.1374e5, "damping": 38.6, "angle_deg": -41.8},
+    "link2": {"stiffness": 5.0972e4, "damping": 7.69, "angle_deg": 20.05},
+    "load": {"force": 2514.7},
+    "friction": {"coefficient": 0.479},
+    "contact": {"half_length": 0.01, "stiffness": 1.375e8},
+    "roughness": {"wheel": {"amplitudes": [2e-5], "wavelengths": [0.05]}},
+    "initial": {"at": "rest", "vx": 0.03, "vy": 0.003},
+    "solver": {"duration": 2.0, "step": 1e-4},
+    "output": {"sample_interval": 2e-4},
+}
+
+
 @pytest.mark.parametrize("duration", [2.0, 5.0])
 def test_the_variation_of_the_torque_waits_for_the_force_where_y_rings_longer_than_x(duration: float) -> None:
-    tables = {
-        "shoe": {"mass": 2.1},
-        "wheel": {"radius": 0.1, "angular_speed": 1.575},
-        "link1": {"stiffness": 5.1374e5, "damping": 38.6, "angle_deg": -41.8},
-        "link2": {"stiffness": 5.0972e4, "damping": 7.69, "angle_deg": 20.05},
-        "load": {"force": 2514.7},
-        "friction": {"coefficient": 0.479},
-        "contact": {"half_length": 0.01, "stiffness": 1.375e8},
-        "roughness": {"wheel": {"amplitudes": [2e-5], "wavelengths": [0.05]}},
-        "initial": {"at": "rest", "vx": 0.03, "vy": 0.003},
-        "solver": {"duration": duration, "step": 1e-4},
-        "output": {"sample_interval": 2e-4},
-    }
-    verdict, system = verdict_of(make(tables)), system_of(make(tables))
+    case = make(RINGS, solver__duration=duration)
+    verdict, system = verdict_of(case), system_of(case)
     assert verdict.settled
     if duration < 4.0:
         assert verdict.torque_variation is None

@@ -8,9 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from matplotlib.figure import Figure
 
 import brakecli
 from brakecli.errors import UsageError
+from brakecli.files.read import open_result
+from brakecli.plots.branch import _line, _with_ends
+from brakecli.plots.result import draw
+from brakecli.plots.style import DARK, applied
 from tests.analysis.shoes import Shoe
 from tests.commands import brakecli as command
 from tests.commands import environment
@@ -98,6 +103,35 @@ def test_the_file_holds_what_json_says_and_opens_in_xarray(here: Path, found: di
     assert tree.attrs["coexists_from"] == found["coexists_from"]
 
 
+def test_steady_sliding_is_full_up_to_its_flutter_and_dashed_beyond(here: Path, found: dict[str, Any]) -> None:
+    with open_result(here / "branch.h5") as stored, applied():
+        upper, lower = draw(stored).axes
+        of_part, _ = draw(stored, variable="stick_fraction").axes
+    assert upper.get_ylabel() == "amplitude of x (µm)"
+    assert of_part.get_ylabel() == "stick fraction"
+    lines: list[Any] = [each for each in lower.get_lines() if each.get_color() == DARK]
+    (full, dashed) = [each for each in lines if len(each.get_xdata()) > 1]
+    assert (full.get_linestyle(), dashed.get_linestyle()) == ("-", "--")
+    assert full.get_xdata()[-1] == dashed.get_xdata()[0] == found["critical"]
+    assert dashed.get_xdata()[-1] == 1.0
+    refused = command("plot", "branch.h5", "--variable", "none", cwd=here)
+    refused.told(
+        2, "--variable none: is no number of branches that is drawn; give one of amplitude, frequency, stick"
+    )
+
+
+def test_a_branch_that_regains_its_stability_has_no_gap() -> None:
+    """The special point that tells where stands between two motions."""
+    columns = {"value": np.arange(4.0), "stable": np.array([0.0, 0.0, 1.0, 1.0]), "frequency": np.arange(4.0)}
+    marks = {"kind": ["fold"], "value": [1.25], "frequency": [1.5]}
+    axes = Figure().subplots()
+    _line(axes, _with_ends(columns, marks), "frequency", DARK)
+    drawn: list[Any] = axes.get_lines()
+    shown = [(each.get_linestyle(), each.get_xydata().tolist()) for each in drawn]
+    ends = [[0.0, 0.0], [1.0, 1.0], [1.25, 1.5]], [[1.25, 1.5], [2.0, 2.0], [3.0, 3.0]]
+    assert shown == [("--", ends[0]), ("-", ends[1])]
+
+
 def test_the_file_is_drawn_reported_exported_and_compared(here: Path, found: dict[str, Any]) -> None:
     command("plot", "branch.h5", "-o", "a.png", cwd=here).told(0)
     command("report", "branch.h5", "-o", "a.html", cwd=here).told(0)
@@ -160,6 +194,8 @@ def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path
         (("--parameter", "friction.coefficient=1:0"), "LOW below HIGH"),
         (("--parameter", "friction.coefficient=0:nan"), "LOW below HIGH"),
         (("--parameter", "friction.coeff=0:1"), "friction.coeff"),
+        (("--parameter", "friction=0:1"), "a table, not a number (found 0.0); did you mean friction.coefficient?"),
+        (("--parameter", "load=0:1"), "did you mean load.force?"),
         (("--parameter", "friction.coefficient,friction.coefficient=0:1"), "no key twice"),
         (("--parameter", "link2.angle_deg=0:95"), "link2.angle_deg"),
         (

@@ -47,6 +47,20 @@ def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
     assert again.json["regime"] == "relaxation"
 
 
+def test_the_frequency_of_a_run_that_has_not_settled_says_so(here: Path, tmp_path: Path) -> None:
+    """The verdict is that of the motion to which it is continued."""
+    settings = ["--set", "solver.duration=0.2", "--set", "friction.coefficient=0.6"]
+    shown = brakecli("run", RELAXATION, *settings, "-o", "short.h5", cwd=tmp_path).out
+    numbers = brakecli("classify", "short.h5", "--json", cwd=tmp_path).json
+    assert (numbers["regime"], numbers["settled"]) == ("relaxation", 0)
+    tone = f"{numbers['frequency']:.6g}"
+    assert f"{tone} Hz, not settled" in shown
+    (tmp_path / "run.h5").write_bytes((here / "run.h5").read_bytes())
+    both = brakecli("classify", "short.h5", "run.h5", cwd=tmp_path).out
+    assert f"{tone}, not settled" in both
+    assert both.count("not settled") == 1
+
+
 def test_a_rough_wheel_is_asked_whether_neighbours_come_together(here: Path) -> None:
     """A forced motion in full contact is linear: they fade as its slowest mode does, by its eigenvalue."""
     rough, smooth = ROOT / "cases" / "rough-full-contact.toml", RELAXATION

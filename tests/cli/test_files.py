@@ -14,9 +14,11 @@ import pytest
 
 from brakecli.about import __version__
 from brakecli.files import fields
+from brakecli.files.contents import difference
 from brakecli.files.read import open_result
 from brakecli.plots import two
 from tests.commands import TINY, attributes, brakecli, each, left_in
+from tests.sweeps.made_up import CYCLE, DAMPED, swept
 
 pandas = import_module("pandas")
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -303,6 +305,32 @@ def test_a_result_is_the_same_as_itself_and_as_its_repetition(folder: Path, tmp_
         assert found.json["same"] is True
         assert [found.json[name] for name in ("case", "numbers", "variables", "versions")] == [[]] * 4
     assert "no difference" in brakecli("diff", folder / "a.h5", folder / "a.h5", cwd=tmp_path).out
+
+
+def test_a_sentence_says_what_differs_in_lines_of_eighty_columns(folder: Path) -> None:
+    lines = brakecli("diff", "a.h5", "b.h5", cwd=folder, COLUMNS="80").out.splitlines()
+    assert max(map(len, lines)) <= 80
+    head = " ".join(lines[: lines.index("")])
+    found = brakecli("diff", "a.h5", "b.h5", "--json", cwd=folder).json
+    most = max(
+        (each["relative"], each["name"], each["largest"]) for each in found["variables"] if each["relative"]
+    )
+    assert head == found["sentence"]
+    regimes = [attributes(folder / name)["regime"] for name in ("a.h5", "b.h5")]
+    same = "is the same" if regimes[0] == regimes[1] else f"differs: {' and '.join(regimes)}"
+    assert head.startswith(f"the case differs in friction.coefficient; the verdict {same}; {most[1]} differs most")
+    assert f"{most[2]:.3g}" in head
+    assert f"{most[0]:.3g} times its largest value" in head
+
+
+def test_a_sentence_counts_the_points_of_sweeps_with_another_verdict(tmp_path: Path) -> None:
+    reports = []
+    for name, made in (("a", [CYCLE, DAMPED, CYCLE]), ("b", [DAMPED, DAMPED, CYCLE])):
+        (tmp_path / name).mkdir()
+        reports.append(swept(tmp_path / name, made).output)
+    with open_result(reports[0]) as a, open_result(reports[1]) as b:
+        said = difference(a, b).sentence
+    assert "the case is the same; the verdict differs at 1 of 3 points; " in said
 
 
 def test_two_runs_differ_in_the_key_that_was_changed_and_in_what_follows(folder: Path) -> None:

@@ -14,9 +14,10 @@ from brakecli.files.fields import CRITICAL as CRITICAL_FIELDS
 from brakecli.files.fields import POINT, WINDOWS
 from brakecli.files.read import open_result
 from brakecli.files.write import FILL, new_result
+from brakecli.plots.gather import gather
 from brakecli.plots.result import draw
 from brakecli.plots.style import applied
-from brakecli.plots.sweep import SweepPicture, gather
+from brakecli.plots.sweep import SweepPicture
 from brakecli.sweeps.plan import label
 from brakecli.sweeps.tables import Sweep
 

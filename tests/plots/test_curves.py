@@ -1,11 +1,14 @@
 """Pictures of sweeps over one axis: curves hold the numbers of the file, and every point has its sign."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from brakecli.plots.style import DARK, applied
 from tests.plots.helpers import ANGLE, CRITICAL, REGIMES, columns, drawn, gathered, legend, panels, points, write
+from tests.sweeps.helpers import axis
+from tests.sweeps.made_up import CYCLE, DAMPED, swept
 
 
 def test_critical_values_and_their_error_bars_are_those_of_the_file(tmp_path: Path) -> None:
@@ -128,3 +131,25 @@ def test_a_long_legend_takes_more_rows_and_stays_inside_the_figure(tmp_path: Pat
     assert len(legend(figure)) == 9
     assert found.get_window_extent().x1 <= figure.bbox.x1
     assert found.get_window_extent().y0 > figure.axes[0].get_window_extent().y1
+
+
+def test_curves_over_initial_states_have_the_colours_of_their_attractors(tmp_path: Path) -> None:
+    """So have those of a list over one key, whose points are drawn in the order of its values."""
+    made = [CYCLE, {**CYCLE, "amplitude": 2e-5}, DAMPED, {**CYCLE, "settled": 0}, CYCLE]
+    (tmp_path / "plan.csv").write_text("initial.vx\n0.3\n0.1\n-0.2\n0.2\n0\n")
+    values = axis("initial.vx", "values = [0.3, 0.1, -0.2, 0.2, 0.0]")
+    for table in (values, 'points = "plan.csv"'):
+        swept(tmp_path, made, table)
+        figure = drawn(tmp_path / "s.h5")
+        (curve,) = [each for each in figure.axes[0].get_lines() if each.get_color() == "#777777"]
+        shown = np.array(curve.get_xydata())
+        np.testing.assert_allclose(shown, [[-0.2, np.nan], [0.0, 10], [0.1, 20], [0.2, 10], [0.3, 10]])
+        assert legend(figure) == [
+            "1: damped, 20.0% of the points",
+            "2: relaxation, 100 Hz, 10 µm, 40.0% of the points",
+            "3: relaxation, 100 Hz, 20 µm, 20.0% of the points",
+            "no attractor known",
+        ]
+        lines: list[Any] = figure.axes[0].get_lines()
+        drawn_ones = [places for each in lines if (places := np.round(each.get_xydata(), 9).tolist())]
+        assert drawn_ones[2:5] == [[[0.0, 10.0], [0.3, 10.0]], [[0.1, 20.0]], [[0.2, 10.0]]]

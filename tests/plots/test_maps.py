@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from brakecli.files.read import open_result
 from brakecli.plots.result import draw
@@ -96,3 +97,57 @@ def test_a_cell_where_nothing_lasts_is_empty_however_large_its_amplitude_still_i
     values: Any = np.ma.asarray(mesh.get_array()).reshape(2, 2)
     assert np.ma.getmaskarray(values).tolist() == [[True, False], [False, False]]
     assert "damped: nothing lasts" in [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+PLAN = """\
+friction.coefficient, solver.scheme, wheel.angular_speed, shoe.mass
+0.5, two-layer, 4, 10
+0.3, two-layer, 4, 11
+0.4, three-layer, 4, 12
+0.4, two-layer, 4, 10
+"""
+
+
+def listed(folder: Path, plan: str, points: list[dict[str, Any]], *tables: str) -> Any:
+    (folder / "plan.csv").write_text(plan)
+    swept(folder, points, 'points = "plan.csv"', *tables)
+    return drawn(folder / "s.h5")
+
+
+def dots(axes: Any) -> dict[tuple[float, float], float]:
+    """The numbers of the coloured dots by their places; those without a number are another collection."""
+    _, coloured = axes.collections
+    pairs = zip(coloured.get_offsets().tolist(), coloured.get_array().tolist(), strict=True)
+    return {(x, y): value for (x, y), value in pairs if value is not None}
+
+
+def test_listed_points_are_dots_in_the_plane_of_the_first_two_keys_that_vary(tmp_path: Path) -> None:
+    failed = {"status": "failed", "amplitude": np.nan}
+    figure = listed(tmp_path, PLAN, [{**CYCLE, "amplitude": 2e-5}, DAMPED, CYCLE, failed])
+    regime, amplitude = figure.axes[:2]
+    assert [regime.get_xlabel(), regime.get_ylabel()] == ["friction.coefficient", "solver.scheme"]
+    assert [each.get_text() for each in regime.get_yticklabels()] == ["three-layer", "two-layer"]
+    places = [(0.5, 1.0), (0.3, 1.0), (0.4, 0.0), (0.4, 1.0)]
+    assert dots(regime) == dict(zip(places[:3], [1.0, 0.0, 1.0], strict=True))
+    assert dots(amplitude) == pytest.approx({places[0]: 20.0, places[2]: 10.0})
+    assert sorted(map(tuple, amplitude.collections[0].get_offsets().tolist())) == [places[1], places[3]]
+    np.testing.assert_array_equal(points(amplitude, "failed"), [places[3]])
+    assert "at different shoe.mass" in [text.get_text() for text in figure.texts]
+
+
+def test_listed_starts_have_the_colours_of_their_attractors(tmp_path: Path) -> None:
+    starts = "initial.x, initial.vy\n1e-5, 0.2\n-1e-5, 0.1\n0, 0\n"
+    figure = listed(tmp_path, starts, [CYCLE, DAMPED, {**CYCLE, "settled": 0}])
+    attractor = figure.axes[0]
+    assert attractor.get_title(loc="left") == "Attractor"
+    assert dots(attractor) == {(1e-5, 0.2): 2.0, (-1e-5, 0.1): 1.0}
+    np.testing.assert_array_equal(points(attractor, "no attractor known"), [[0.0, 0.0]])
+
+
+def test_critical_values_of_listed_points_are_the_colours_of_dots(tmp_path: Path) -> None:
+    search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n'
+    made = [{"critical_status": "found", "critical": value} for value in (0.3, 0.5)]
+    made += [{"critical_status": "stable throughout", "critical": np.nan}]
+    (axes, _) = listed(tmp_path, "shoe.mass, link2.angle_deg\n1, 30\n2, 20\n3, 25\n", made, search).axes
+    assert dots(axes) == {(1.0, 30.0): 0.3, (2.0, 20.0): 0.5}
+    np.testing.assert_array_equal(points(axes, "stable up to 2"), [[3.0, 25.0]])

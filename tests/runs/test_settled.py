@@ -26,9 +26,12 @@ from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
+from tests.analysis.test_verdicts import RINGS
 from tests.commands import TINY, attributes, brakecli
 from tests.examples import ROUGH, SQUEAL, make
 from tests.sweeps.helpers import axis, inline, write_sweep
+from tests.sweeps.made_up import CYCLE, SPEEDS, made_of
+from tests.sweeps.made_up import DAMPED as DIES
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -53,7 +56,7 @@ def made_up(*durations: float, failure: Failure = Failure.NONE) -> list[float]:
 
     def run(part: System) -> Judged[Motion]:
         tried.append(part.duration)
-        open_ = Decision("", advice="" if part.duration in durations else "run longer")
+        open_ = Decision("", longer=part.duration not in durations)
         done = Decision("", Regime.DAMPED)
         verdict = replace(judged.verdict, decision=done if part.duration in durations else open_)
         motion = replace(judged.motion, work=replace(judged.motion.work, failure=failure))
@@ -89,6 +92,17 @@ def test_a_vibration_that_lasts_is_run_until_its_numbers_are_those_of_any_longer
     assert verdict.amplitude == pytest.approx(long.amplitude, rel=1e-4)
 
 
+def test_a_run_goes_on_while_the_friction_force_rings_beside_a_settled_x() -> None:
+    """Its torque's variation is not known before; half of the run does not know it."""
+    found = settle(make({**RINGS, "solver": {"step": 1e-4, "duration": "settled"}}))
+    assert found.warnings == ()
+    assert found.judged.verdict.torque_variation is not None
+    half = judge(replace(found.system, duration=0.5 * found.system.duration)).verdict
+    assert half.settled
+    assert half.unfinished
+    assert half.torque_variation is None
+
+
 def test_runs_are_twice_as_long_each_time_until_one_is_decided() -> None:
     assert made_up(8.0) == [2.0, 4.0, 8.0]
     assert made_up(2.0) == [2.0]
@@ -104,7 +118,7 @@ def test_a_run_that_cannot_keep_its_tolerance_is_not_made_longer() -> None:
     found = judge(replace(system, duration=0.02))
     assert found.certificate is not None
     broken = found._replace(
-        verdict=replace(found.verdict, decision=Decision("", advice="run longer")),
+        verdict=replace(found.verdict, decision=Decision("", longer=True)),
         certificate=replace(found.certificate, certified=False),
     )
     ended = settled(system, lambda part: broken)
@@ -117,7 +131,7 @@ def test_the_longest_run_is_the_limit_and_is_told() -> None:
     system = asked(system_of(make(EXACT, link1__damping=0.0, link2__damping=0.0, output__sample_interval=5e-4)))
     judged = judge(replace(system, duration=0.2))
     lasting = Decision("", Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED)
-    open_ = judged._replace(verdict=replace(judged.verdict, decision=lasting, settled=False, notes={}))
+    open_ = judged._replace(verdict=replace(judged.verdict, decision=lasting, settled=False, longer=True))
     found = settled(system, lambda part: open_)
     assert found.judged.verdict.regime is Regime.QUASI_HARMONIC
     assert found.system.duration == pytest.approx(longest(system))
@@ -127,7 +141,7 @@ def test_the_longest_run_is_the_limit_and_is_told() -> None:
 
 DAMPED = Decision("decays", Regime.DAMPED)
 BLANK = Verdict(DAMPED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, {})
-UNDECIDED = Decision("grows", advice="run at least 3 s")
+UNDECIDED = Decision("grows", longer=True)
 LASTS = Decision("lasts", Regime.RELAXATION, Excitation.SELF_EXCITED)
 
 
@@ -135,16 +149,14 @@ LASTS = Decision("lasts", Regime.RELAXATION, Excitation.SELF_EXCITED)
     ("decision", "changes", "unfinished"),
     [
         (UNDECIDED, {}, True),
-        (Decision("either"), {}, True),
-        (Decision("neutral", advice="a dashpot would decide"), {}, False),
+        (Decision("neutral"), {}, False),
         (DAMPED, {"left": 0.5}, True),
         (DAMPED, {"left": 1e-3}, False),
         (DAMPED, {"left": 0.5, "settled": True}, False),
         (LASTS, {"settled": True}, False),
-        (LASTS, {}, True),
-        (LASTS, {"notes": {"settled": "still changes: run at least 3 s"}}, True),
-        (LASTS, {"notes": {"settled": "impacts shift it: take a solver.step of 1e-6 s"}}, False),
-        (LASTS, {"notes": {"torque_variation": "samples miss impacts"}}, True),
+        (LASTS, {}, False),
+        (LASTS, {"longer": True}, True),
+        (LASTS, {"settled": True, "longer": True}, True),
     ],
 )
 def test_a_verdict_says_whether_a_longer_run_may_say_more(
@@ -182,10 +194,25 @@ def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
     with open_result(tmp_path / "s.h5", kind="sweep") as stored:
         durations, regimes = stored.read("/", "duration"), stored.read("/", "regime")
     assert report.findings.warned == 0
+    ran = " to ".join(f"{each:.4g}" for each in durations)
+    assert report.findings.sentences == [f"all 2 points have settled, in {ran} s"]
     alone = [settle(parse_case(OPEN, "", [f"friction.coefficient={phi}"]).case).system for phi in (0.3, 0.565)]
     assert durations.tolist() == pytest.approx([each.duration for each in alone])
     assert durations[1] >= 4.0 * durations[0]
     assert {*regimes.tolist()} == {"damped"}
+
+
+def test_a_sweep_counts_the_points_that_have_not_settled(tmp_path: Path) -> None:
+    """Undecided ones, and those whose numbers are not those that last; one that fails is counted elsewhere."""
+    made = [{**CYCLE, "duration": 2.0}, {**DIES, "duration": 4.0}, {**CYCLE, "settled": 0, "duration": 16.0}]
+    made += [{"regime": "undecided", "duration": 32.0}, {"status": "failed"}]
+    loaded = write_sweep(tmp_path, SPEEDS.format(5), case=OPEN)
+    said = inline(loaded, tmp_path / "s.h5", made_of(made)).findings.sentences
+    ran = "2 of 5 points have settled, in 2 to 4 s; others ran for 16 to 32 s, and their reasons say more"
+    assert ran in said
+    numbers = write_sweep(tmp_path, axis("solver.duration", "values = [0.1, 0.2]"), case=OPEN)
+    said = inline(numbers, tmp_path / "n.h5", made_of(made)).findings.sentences
+    assert not any("settled" in each for each in said)
 
 
 def test_check_tells_how_long_a_run_may_become_and_a_number_is_not_touched() -> None:

@@ -42,6 +42,12 @@ distribution = "normal"
 mean = 5.0
 deviation = 0.5
 """
+PERCENT = """\
+[[parameter]]
+key = "link2.angle_deg"
+distribution = "uniform"
+tolerance_percent = 10.0
+"""
 DAMPING = """\
 [[parameter]]
 keys = ["link1.damping", "link2.damping"]
@@ -60,13 +66,13 @@ def write_study(folder: Path, *tables: str, case: str | None = None) -> Path:
 
 
 def scattering(**tables: Any) -> Parameter:
-    """A parameter of the friction coefficient."""
-    return Parameter.model_validate({"key": "friction.coefficient", **tables})
+    """A parameter that may have any value."""
+    return Parameter.model_validate({"key": "initial.x", **tables})
 
 
 def study_of(*parameters: dict[str, Any], **tables: Any) -> Study:
-    """A study of made-up keys."""
-    rows = [{"key": f"key.{number}", **each} for number, each in enumerate(parameters)]
+    """A study of keys that may have any value."""
+    rows = [{"key": f"initial.{name}", **each} for name, each in zip(("x", "y", "vx"), parameters, strict=False)]
     return Study.model_validate({"case": "-", "parameter": rows, **tables})
 
 
@@ -384,7 +390,10 @@ def test_where_no_friction_is_critical_the_indices_say_so(tmp_path: Path) -> Non
     [
         ((FRICTION, FRICTION), "study.toml:9: parameter[1].key: is set twice"),
         ((FRICTION.replace("high = 0.8", ""),), "low: is given alone"),
-        ((FRICTION.replace("low = 0.3\nhigh = 0.8", ""),), "give low and high, or mean and deviation"),
+        (
+            (FRICTION.replace("low = 0.3\nhigh = 0.8", ""),),
+            "give low and high, mean and deviation, or tolerance_percent",
+        ),
         ((FRICTION.replace("0.8", "0.2"),), "high: is not above low"),
         ((FRICTION + "mean = 0.5\ndeviation = 0.1",), "mean: is given together with low and high"),
         ((FRICTION + "mode = 0.5",), "mode: is only for a triangular distribution"),
@@ -393,9 +402,45 @@ def test_where_no_friction_is_critical_the_indices_say_so(tmp_path: Path) -> Non
         ((ANGLE.replace("0.5", "0"),), "deviation: is out of range"),
         (
             (FRICTION.replace("friction", "frction"),),
-            "study.toml: frction: is unknown (found a table); did you mean",
+            "study.toml:3: parameter[0].key: frction.coefficient is unknown; did you mean [friction]?",
         ),
-        ((FRICTION.replace("0.3", "-0.3"),), "give low and high beside mean and deviation"),
+        (
+            (FRICTION.replace(".coefficient", ""),),
+            "study.toml:5: parameter[0].low: friction is a table, not a number (found 0.3); did you",
+        ),
+        (
+            (FRICTION.replace("0.3", "-0.3"),),
+            "study.toml:5: parameter[0].low: friction.coefficient is out of range (found -0.3); give",
+        ),
+        (
+            (ANGLE.replace("5.0", "89.5").replace("normal", "uniform"),),
+            "study.toml:2: parameter[0]: link2.angle_deg is out of range (found 90.",
+        ),
+        (
+            (ANGLE.replace("5.0", "89.5").replace("normal", "uniform"),),
+            "give a number from -90 to 90, in deg: a uniform distribution reaches √3 deviations far",
+        ),
+        ((ANGLE.replace("5.0", "89.0"),), "cut its distribution off: give low and high beside mean and deviation"),
+        (
+            (PERCENT + "mean = 1.0\ndeviation = 0.1",),
+            "tolerance_percent: is given together with mean and deviation",
+        ),
+        (
+            (PERCENT.replace("link2.angle", "link1.angle"),),
+            "study.toml:5: parameter[0].tolerance_percent: is part of",
+        ),
+        (
+            (PERCENT.replace("10.0", "2000.0"),),
+            "study.toml:5: parameter[0].tolerance_percent: link2.angle_deg is out",
+        ),
+        (
+            (
+                DAMPING.replace("link1.damping", "shoe.mass").replace(
+                    "low = 200.0\nhigh = 400.0", "tolerance_percent = 1.0"
+                ),
+            ),
+            "shoe.mass, link2.damping differ in the case: 10.0, 300.0",
+        ),
         ((ANGLE + "low = 9.2\nhigh = 12.0",), "low: and high lie where no value falls"),
         (("band = [100.0]", FRICTION), "band: is no pair"),
         (("band = [1.0, 2.0, 3.0]", FRICTION), "band: is no pair"),
@@ -416,16 +461,47 @@ def test_a_wrong_study_is_refused_with_its_line(tmp_path: Path, tables: tuple[st
     assert said in str(refused.value)
 
 
+def test_all_that_is_wrong_with_a_study_is_told_at_once_and_each_of_it_once(tmp_path: Path) -> None:
+    wrong = FRICTION.replace("friction", "frction").replace("low = 0.3\n", "") + ANGLE.replace("angle", "angel")
+    with pytest.raises(CaseError) as refused:
+        brakecli.scatter(write_study(tmp_path, wrong, PERCENT))
+    assert [each.path for each in refused.value.problems] == [
+        ("parameter", 0, "key"),
+        ("parameter", 0, "high"),
+        ("parameter", 1, "key"),
+    ]
+
+
+def test_per_cent_are_those_of_the_drawing(tmp_path: Path) -> None:
+    """The case has 5 degrees, and 300 N·s/m in both links; advice is about the drawing that it is given."""
+    both = DAMPING.replace("low = 200.0\nhigh = 400.0", "tolerance_percent = 20.0")
+    path = write_study(tmp_path, PERCENT, both, 'indices_of = "none"')
+    study = load_study(str(path), ["link2.angle_deg=-6.0"]).study
+    ends = [end for each in study.parameter for end in (each.low, each.high)]
+    assert ends == pytest.approx([-6.6, -5.4, 240.0, 360.0])
+    report = brakecli.scatter(path)
+    for name, low, high in (("link2_angle_deg", 4.5, 5.5), ("link1_damping", 240.0, 360.0)):
+        values = report[name].to_numpy()
+        assert low <= values.min() < low + 0.05 * (high - low)
+        assert high - 0.05 * (high - low) < values.max() <= high
+    assert "tolerance_percent" in str(report.attrs["study_toml"])
+    assert "tolerance_percent" not in str(report.attrs["resolved_study_toml"])
+    shown = command("advise", "shoe.toml", "--set", "link2.angle_deg=7.0", "--scatter", "study.toml", cwd=tmp_path)
+    assert "scatters it between" not in shown.err
+
+
 def test_other_files_are_told_from_studies(tmp_path: Path) -> None:
     path = write_study(tmp_path, FRICTION)
     command("scatter", "shoe.toml", cwd=tmp_path).told(
-        2, "this is a case; simulate it with: brakecli run shoe.toml"
+        2,
+        "is a case; simulate it with: brakecli run shoe.toml, or write a study of it with: brakecli new scatter",
     )
+    command("advise", "shoe.toml", "--scatter", "shoe.toml", cwd=tmp_path).told(2, "with: brakecli new scatter")
     command("run", "study.toml", cwd=tmp_path).told(2, "study.toml: ")
     with pytest.raises(BrakecliError):
         brakecli.sweep(path, jobs=1)
     (tmp_path / "shoe.toml").unlink()
-    with pytest.raises(CaseError, match=r"study\.toml: case: "):
+    with pytest.raises(CaseError, match=r"study\.toml:1: case: "):
         load_study(str(path), None)
 
 

@@ -63,6 +63,7 @@ def classify(
         torque_variation=radius * what.variation if what.variation is not None else None,
         settled_from=part.start * history.interval,
         start=part.start,
+        longer=what.force_rings is not None or (what.longer and not what.settled),
         settled=what.settled and decision.regime is not Regime.UNDECIDED,
         stick_fraction=cycles.stick_fraction if cycles else part.fraction(ContactState.STICK),
         contact_loss_fraction=cycles.contact_loss_fraction if cycles else part.fraction(ContactState.SEPARATED),

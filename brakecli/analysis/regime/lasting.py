@@ -49,6 +49,7 @@ class Lasting:
     cycles: Cycles | None = None  # of a vibration that lasts by itself
     force_from: int = 0  # the sample from which on the force has settled: y may ring longer than x
     force_rings: float | None = None  # for how long it still rings beside a settled x
+    longer: bool = True  # whether a longer run may settle what has not
     notes: dict[str, str | None] = field(default_factory=dict)
     evidence: dict[str, Any] = field(default_factory=dict)
 
@@ -235,6 +236,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         text = f"this vibration settles at only {rate:.2g} 1/s, and impacts of so few steps may shift it by"
         text += f" {_IMPACT_AMPLITUDE_ERROR * shift:.0%}"
         text += f": take a solver.step of {step:.2g} s, or a solver.tolerance"
+        found.longer = False
     elif not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
     elif not answers.waves and far:
@@ -290,6 +292,7 @@ def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
         found.spread += found.amplitude * context.detuned(part, lines) + (ripple.size if ripple else 0.0)
     if ripple and ripple.counts:
         found.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
+        found.longer &= not found.settled
         found.notes["ripple"], found.settled = ripple.sentence, False
 
 

@@ -56,6 +56,7 @@ class Decision(NamedTuple):
     stick_fraction: float | None = None
     advice: str = ""  # what to do
     row: str = ""  # its name
+    longer: bool = False  # whether a longer run may decide
 
     @property
     def sentence(self) -> str:
@@ -68,7 +69,10 @@ T = TypeVar("T")  # and the thresholds of a table
 
 
 class Row(NamedTuple, Generic[A, T]):
-    """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers."""
+    """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers.
+
+    `longer` says whether a longer run may decide where the row does not.
+    """
 
     name: str
     holds: Callable[[A, T], Any]
@@ -76,11 +80,13 @@ class Row(NamedTuple, Generic[A, T]):
     remedy: str = ""
     regime: Regime = Regime.UNDECIDED
     excitation: Excitation = Excitation.NONE
+    longer: bool | Callable[[A], Any] = False
 
     def decision(self, answers: A) -> Decision:
         """What it says of these answers."""
         reason, advice = (text.format(a=answers) for text in (self.sentence, self.remedy))
-        return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name)
+        longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
+        return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
 
 
 def _steady(a: Answers, t: Thresholds) -> bool:
@@ -162,6 +168,7 @@ CONTACT: Rows = (
         lambda a, t: a.left,
         "the shoe has left the wheel",
         "run longer, to see whether it comes back",
+        longer=True,
     ),
     Row(
         "at rest",
@@ -188,12 +195,14 @@ CONTACT: Rows = (
         lambda a, t: a.carried,
         "the shoe sticks throughout and is carried along by the wheel",
         "run longer",
+        longer=True,
     ),
     Row(
         "few samples",
         lambda a, t: a.few_samples,
         "only {a.samples} samples, too few",
         "run longer, or sample more often",
+        longer=True,
     ),
     Row(
         "changes",
@@ -205,6 +214,7 @@ CONTACT: Rows = (
         lambda a, t: not a.moves and a.growth > 0.0,
         "nothing moves yet, but sliding is unstable: a disturbance grows at {a.growth:.3g} 1/s",
         "start beside steady sliding{a.or_longer}",
+        longer=lambda a: a.or_longer,
     ),
     Row(
         "nothing moves",
@@ -227,6 +237,7 @@ COMES_AND_GOES: Row[Answers, Thresholds] = Row(
     lambda a, t: not math.isfinite(a.change),
     "the motion comes and goes: in a part of the second half nothing moves",
     "run longer",
+    longer=True,
 )
 SMOOTH: Rows = (
     Row(
@@ -240,6 +251,7 @@ SMOOTH: Rows = (
         lambda a, t: a.linear and _grows(a, t),
         _LINEAR + ": still growing at {a.own:.3g} 1/s ({a.ringing:.4g} Hz)",
         "run at least {a.grown:.3g} s",
+        longer=True,
     ),
     Row(
         "linear, decays",
@@ -302,6 +314,7 @@ SMOOTH: Rows = (
         lambda a, t: True,
         "the level {a.word} by e^{a.change:.2g} in the second half, and what it comes to is not known",
         "run at least {a.longer:.3g} s",
+        longer=True,
     ),
 )
 ROUGH: Rows = (
@@ -310,6 +323,7 @@ ROUGH: Rows = (
         lambda a, t: a.duration < a.slowest,
         "the run is shorter than the period of the slowest wave, {a.slowest:.3g} s",
         "run at least {a.two_waves:.3g} s",
+        longer=True,
     ),
     *SMOOTH[:1],
     Row(
@@ -325,6 +339,7 @@ ROUGH: Rows = (
         lambda a, t: a.linear,
         _LINEAR + ": neighbours neither come together nor part surely, at {a.even:.2g} ± {a.even_error:.1g} 1/s",
         "run longer; without dashpots, " + _DASHPOT,
+        longer=True,
     ),
     Row(
         "forced, no friction",
@@ -389,6 +404,7 @@ ROUGH: Rows = (
         "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
         "second half",
         "run at least {a.waited:.3g} s",
+        longer=True,
     ),
     Row(
         "no dashpots, rough",
@@ -428,6 +444,7 @@ ROUGH: Rows = (
         lambda a, t: not _steady(a, t),
         "the level {a.word} by e^{a.change:.2g} in the second half",
         "run at least {a.longer:.3g} s",
+        longer=True,
     ),
     Row(
         "either",
@@ -435,6 +452,7 @@ ROUGH: Rows = (
         "friction and the roughness may both keep the vibration up: of its power friction gives "
         "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; neighbours change at "
         "{a.exponent:.2g} 1/s; without the roughness it {a.without_waves}",
+        longer=True,
     ),
 )
 LOOKS: Rows = (
@@ -443,6 +461,7 @@ LOOKS: Rows = (
         lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
         "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
         "run longer",
+        longer=True,
     ),
     Row(
         "few steps in a cycle",
@@ -461,6 +480,7 @@ LOOKS: Rows = (
         lambda a, t: a.seconds < 2.0 * a.slowest,
         "but the settled part holds less than two periods of the slowest wave, {a.slowest:.3g} s",
         "run at least {a.two_waves:.3g} s",
+        longer=True,
     ),
     Row(
         "limit cycle with stick",
@@ -483,6 +503,7 @@ LOOKS: Rows = (
         lambda a, t: a.waves and not _steady(a, t),
         "but its level still {a.word} by e^{a.change:.2g} in the second half, which changes how it looks",
         "run at least {a.longer:.3g} s",
+        longer=True,
     ),
     Row(
         "relaxation",
@@ -505,6 +526,7 @@ LOOKS: Rows = (
         lambda a, t: True,
         "irregular: stick in {a.stick_cycles:.0%} of the cycles, {a.lines}",
         "run longer, or look at the spectrum",
+        longer=True,
     ),
 )
 

@@ -28,6 +28,7 @@ class Verdict:
     amplitude_forced: float | None = None  # m, on a rough wheel: what the roughness forces
     amplitude_own: float | None = None  # m, on a rough wheel: what the shoe adds
     forced_frequency: float | None = None  # Hz, of the wave that moves x most
+    longer: bool = False  # whether a longer run may say more of the numbers of what lasts
     left: float = 0.0  # of the level of vx at its highest, in the last quarter
     growth_rate: float | None = None  # 1/s, of the slowest mode where the motion is linear
     ringing_frequency: float | None = None  # Hz, of that mode
@@ -53,14 +54,12 @@ class Verdict:
 
     @property
     def unfinished(self) -> bool:
-        """Whether a longer run may say more of the regime, or of numbers that last: sentences ask for it then."""
+        """Whether a longer run may say more of the regime, or of numbers that last."""
         if self.regime is Regime.UNDECIDED:
-            asked = [self.decision.advice] if self.decision.advice else []
-        elif self.settled or self.excitation is Excitation.NONE:
+            return self.decision.longer
+        if self.excitation is Excitation.NONE:
             return not self.settled and self.left > FADED
-        else:
-            asked = [self.notes[about] for about in ("settled", "beat", "ripple") if about in self.notes]
-        return not asked or any("run " in text for text in asked)
+        return self.longer
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -51,7 +51,9 @@ class CallerEngine(Engine):
 class LocalEngine(Engine):
     """Processes on this machine: one that dies takes no more than its task with it, and another one is started.
 
-    The pools of the standard library and of loky lose the whole sweep with one worker.
+    Libraries were tried. The pools of the standard library and of loky lose the whole sweep with one worker.
+    Pebble keeps it, but its workers go on after the death of their parent until their task has ended, and Ctrl-C
+    waits for them.
     """
 
     def __init__(self, compute: Compute, workers: int) -> None:
