@@ -5,6 +5,7 @@ program, imports once and forks for each command.
 """
 
 import atexit
+import gc
 import json
 import math
 import os
@@ -19,6 +20,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cache
+from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
@@ -204,10 +206,14 @@ def _server() -> subprocess.Popen[str]:
 
 
 def _serve() -> None:
-    import brakecli.comparison.result
-    import brakecli.front.tables
-    import brakecli.sweeps.result  # noqa: F401 - these load all that a command needs
+    from matplotlib.backends import backend_agg, backend_svg  # noqa: F401 - which a picture loads as it is saved
+
     from brakecli.__main__ import main
+
+    for path in sorted((ROOT / "brakecli").rglob("[!_]*.py")):  # all that any command loads
+        if path.stem not in ("api", "accessor"):
+            import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))
+    gc.freeze()  # a fork then leaves the memory of the server as it is
 
     for line in sys.stdin:
         cwd, words, place, memory = json.loads(line)

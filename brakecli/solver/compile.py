@@ -65,6 +65,7 @@ def source_hash(folder: Path = Path(__file__).parent) -> str:
 
 def _cache_directory() -> Path | None:
     """Where machine code is kept; None where nothing can be written, or where somebody else could write, too."""
+    global _lock
     base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
         directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
@@ -74,7 +75,7 @@ def _cache_directory() -> Path | None:
             found = each.lstat()
             if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & others:
                 raise PermissionError(errno.EPERM, "it is not a folder in which this user alone writes", str(each))
-        os.close(_open_lock(directory))
+        _lock = os.open(directory / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except (OSError, RuntimeError) as error:
         reason = f"{getattr(error, 'strerror', None) or error} (found {getattr(error, 'filename', None) or base})"
         what = f"the cache of compiled kernels cannot be used: {reason[0].lower()}{reason[1:]}"
@@ -83,14 +84,10 @@ def _cache_directory() -> Path | None:
     return directory
 
 
-def _open_lock(folder: Path) -> int:
-    """The lock of a cache, in its folder, in which nobody else can write."""
-    return os.open(folder / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-
-
+_lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
 CACHE = _cache_directory()
 PATIENCE = 60.0  # s that another process may take to compile a kernel
-_held: list[int] = []  # the lock, while this process compiles a kernel
+_held: list[int] = []  # the bytes locked for the kernels that this process compiles, each called by the one before
 
 
 class _Compiling(events.Listener):  # type: ignore[misc]
@@ -134,8 +131,8 @@ class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
 
     def load(self, key: Any) -> Any:
         found = super().load(key)
-        if found is None and not _held:
-            _wait_for_others()
+        if found is None:
+            _wait_for_others(zlib.crc32(Path(self._index_path).name.encode()))
             found = super().load(key)  # another process may have compiled it meanwhile
         return found
 
@@ -155,21 +152,22 @@ class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
             file.write(contents.getvalue() + _checksum(filepath, contents.getvalue()))
 
 
-def _wait_for_others() -> None:
-    """Take the lock of the cache, so that one process at a time compiles a kernel, and keeps it."""
+def _wait_for_others(place: int) -> None:
+    """Take the lock of a kernel, so that one process compiles it while others may compile other kernels."""
     global PATIENCE
     assert CACHE is not None
-    _held.append(_open_lock(CACHE))
+    _held.append(place)
     end = time.monotonic() + PATIENCE
     with suppress(OSError):  # a disk without locks: do without
         while True:
             with suppress(BlockingIOError):
-                return fcntl.flock(_held[0], fcntl.LOCK_EX | fcntl.LOCK_NB)
+                fcntl.lockf(_lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
+                return
             if time.monotonic() > end:
                 what = f"{CACHE / 'lock'}: another process has compiled a kernel for more than {PATIENCE:g} s"
                 compiling.set_trouble(f"{what}, and is no longer waited for; end it if it hangs")
                 PATIENCE = 0.0  # nor for the other kernels
-                return None
+                return
             time.sleep(0.02)
 
 
@@ -202,15 +200,16 @@ def _not_compiled(function: Any, options: dict[str, Any]) -> Any:
 
 def _compile(dispatcher: Any, signature: Any) -> None:
     """Compile a kernel for one signature, or load it from the cache."""
-    outermost = not _held  # those that it calls may be compiled on the way
+    before = len(_held)
     try:
         dispatcher.compile(signature)
     except Exception:  # the cache cannot be written, on a full disk: do without
         dispatcher._cache = caching.NullCache()
         dispatcher.compile(signature)
     finally:
-        while outermost and _held:
-            os.close(_held.pop())
+        while len(_held) > before:
+            with suppress(OSError):  # a disk without locks
+                fcntl.lockf(_lock, fcntl.LOCK_UN, 1, _held.pop())
     dispatcher.disable_compile()
 
 

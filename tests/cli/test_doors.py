@@ -161,7 +161,7 @@ def test_many_waves_are_drawn_without_a_minute_of_silence(here: Path) -> None:
     text = TINY.replace("duration = 0.02", "duration = 0.001").replace("step = 1e-5", "step = 1e-4")
     (here / "many.toml").write_text(text + rough)
     brakecli("run", "many.toml", "-q", cwd=here).told(0)
-    forked("plot", "many.h5", cwd=here, memory=3_000_000_000).told(0)  # sums of two would take 16 GB
+    forked("plot", "many.h5", cwd=here, memory=2_715_000_000).told(0)  # sums of two would take 16 GB
 
 
 def test_a_small_file_that_unpacks_to_very_much_is_refused(good: Path, here: Path) -> None:
@@ -174,7 +174,7 @@ def test_a_small_file_that_unpacks_to_very_much_is_refused(good: Path, here: Pat
         for _ in range(1000):
             group = group.create_group("g")
     reading = ["--quantity", "velocity", "--sample-rate", "1000"]
-    told = forked("classify", "s.h5:/v", *reading, cwd=here, memory=2_000_000_000)
+    told = forked("classify", "s.h5:/v", *reading, cwd=here, memory=1_715_000_000)
     assert "claims 1073741824 values" in told.told(4)
     inside = "/".join("g" * 1000)
     brakecli("classify", f"s.h5:/{inside}", *reading, cwd=here).told(4, "more than 8 levels")

@@ -6,6 +6,7 @@ import random
 import shutil
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -192,11 +193,24 @@ def test_a_process_that_keeps_the_lock_is_waited_for_no_longer_than_a_limit_and_
     (folder,) = (tmp_path / "brakecli").iterdir()
     assert folder.stat().st_mode & 0o777 == 0o700
     with (folder / "lock").open("r+") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
+        fcntl.lockf(lock, fcntl.LOCK_EX)
         said = python(TROUBLE, tmp_path)
     assert said.startswith(f"trouble: {folder}/lock: another process has compiled a kernel for more than 0.1 s")
     assert said.count("\n") == 1
     assert any(folder.rglob("*.nbc"))
+
+
+def test_a_process_waits_for_the_kernels_alone_that_another_one_compiles(cache: Path) -> None:
+    """Those of friction are locked by their names; others are compiled meanwhile."""
+    (folder,) = (cache / "brakecli").iterdir()
+    indices = sorted(folder.rglob("friction.*.nbi"))
+    with (folder / "lock").open("r+") as lock:
+        for path in indices:
+            fcntl.lockf(lock, fcntl.LOCK_EX, 1, zlib.crc32(path.name.encode()))
+            path.unlink()
+        assert python(TROUBLE.replace("friction", "double_double"), cache) == "trouble: \n"
+        assert f"{folder}/lock: another process" in python(TROUBLE, cache)
+    assert indices
 
 
 @pytest.mark.parametrize(
