@@ -20,7 +20,7 @@ from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
 from brakecli.solver.lanes import advance
-from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, STEPS, THETA_1, WAVES, Shared
+from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, PAIR, STEPS, THETA_1, WAVES, Shared
 from brakecli.solver.motion import Motion, OwnError, Work
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.records import PARTS, Coefficients
@@ -47,7 +47,7 @@ def fits(system: System) -> Hashable | None:
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
     large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
-    if not system.steady or sliding == 0.0 or large:
+    if not system.steady or sliding == 0.0 or large or system.nodes % 2:
         return None
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
@@ -58,16 +58,17 @@ def fits(system: System) -> Hashable | None:
 
 @lru_cache(maxsize=4)
 def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[Any, ...]:
-    """What `Shared` holds from `length` to `table`."""
-    pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
-    waves, table = np.zeros((WAVES, 3)), aligned(nodes * (1 + 2 * WAVES)).reshape(nodes, -1)
+    """What `Shared` holds from `length` to `table`, for an even number of nodes."""
+    (pad, tables), half = build_pad(1.0, half_length, shoe, wheel, nodes), nodes // 2
+    waves, table = np.zeros((WAVES, 3)), aligned(half * (2 + 2 * WAVES)).reshape(half, -1)
     own, tiles = len(wheel.g), -(-(nodes + 2 * BESIDE) // TILE)
     full_at, waves_at = int(pad.full_at), int(pad.waves_at)
     waves[:own] = np.stack([wheel.omega, wheel.phase, tables[full_at : full_at + own]], axis=1)
     by_tiles = tables[waves_at : waves_at + tiles * own * 2 * TILE].reshape(tiles, own, 2, TILE)
-    table[:, 0] = tables[pad.nodes_at : pad.nodes_at + nodes]
+    f1 = tables[pad.nodes_at : pad.nodes_at + nodes]
+    table[:, 0], table[:, 1] = f1[:half], f1[: -half - 1 : -1]
     for wave, function in np.ndindex(own, 2):
-        table[:, 1 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + nodes]
+        table[:, 2 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + half]
     heights = (float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean"))
     return 2.0 * half_length, *heights, waves.ravel(), table.ravel()
 
@@ -84,15 +85,11 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
 
 def _run_lanes(systems: list[System]) -> list[Motion | None]:
     begin, alike, number = time.perf_counter(), systems[0], len(systems)
-    signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
-    surfaces = _tables(alike.half_length, alike.shoe, alike.wheel, alike.nodes)
-    o = _filled([*systems, *systems[-1:] * (LANES - number)])
+    o = filled([*systems, *systems[-1:] * (LANES - number)])
     rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))
     carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
     sizes = np.ones((PARTS if carried else 0, LANES))
-    grid = alike.step, alike.interval, alike.per_sample, alike.nodes
-    carrying = DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried
-    advance(o, Shared._make((*grid, *surfaces, signals, *carrying)), rows, sizes)
+    advance(o, shared(alike, DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried), rows, sizes)
     exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
     seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
     for n, (system, exponent) in enumerate(zip(systems, exponents, strict=False)):
@@ -112,7 +109,15 @@ def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
         return exponents(np.log(np.clip(sizes, LEAST, MOST)), duration)
 
 
-def _filled(systems: Sequence[System]) -> Any:
+def shared(system: System, first: int, beyond: int) -> Shared:
+    """What a system has in common with others beside it, where the kinds from `first` on are carried along."""
+    grid = system.step, system.interval, system.per_sample, system.nodes
+    surfaces = _tables(system.half_length, system.shoe, system.wheel, system.nodes)
+    gaps, signals = aligned(PAIR * (system.nodes // 2 + 3)), np.frombuffer(stop.memory, np.uint8).ctypes.data
+    return Shared._make((*grid, *surfaces, gaps, signals, first, beyond))
+
+
+def filled(systems: Sequence[System]) -> Any:
     """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
     c = Coefficients(*np.array([each.coefficients for each in systems]).T)
     start, h, wheel = np.array([_start(each) for each in systems]).T, systems[0].step, systems[0].wheel

@@ -2,7 +2,8 @@
 
 import json
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -16,7 +17,7 @@ from brakecli.case import wording
 from brakecli.case.case import Case, given_toml
 from brakecli.case.read import LoadedCase, key_path, parse_over_case, parse_table, put
 from brakecli.case.roughness import Record, Records, reading
-from brakecli.case.tables import Table
+from brakecli.case.tables import Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.files import fields
 from brakecli.files.toml_lines import Located, innermost, parse
@@ -24,9 +25,6 @@ from brakecli.sweeps.listed import GIVEN, Listed, read_listed
 from brakecli.sweeps.tables import Axis, Sweep
 
 MOST_TRIED = 1000  # listed numbers of an axis that are tried before the sweep starts; of a range it is both ends
-
-_ALONE = ("shoe", "wheel", "link1", "link2", "load", "friction", "contact", "solver")
-"""Tables of a case that hold nothing which follows from another table."""
 
 Settings = dict[tuple[str, ...], Any]
 """Values by key path, to be put into the base case."""
@@ -56,7 +54,7 @@ class Plan:
         self.points = math.prod(self.shape)  # of the grid
         # the axis along which the motion is followed, and how often that is: twice both up and down
         self.followed = next((index for index, axis in enumerate(axes) if axis.direction), None)
-        self._valid = dict[str, Table]()  # tables of the case that no point has changed
+        self._valid = dict(_valid_tables(self.case_keys))  # which points need not check again
         self.passes = 2 if any(axis.direction == "both" for axis in axes) else 1
         sizes = {axis.name: axis.size for axis in axes} or {"point": self.points}
         self.dimensions = {"direction": 2, **sizes} if self.passes == 2 else sizes  # of the result
@@ -99,14 +97,11 @@ class Plan:
         data = _tables(self.case_keys)
         for path, value in settings.items():
             put(data, path, value, Case, kept=settings)
-        touched = {path[0] for path in settings}
-        same = [name for name in _ALONE if name not in touched and data.get(name) == self.case_keys.get(name)]
-        data |= {name: self._valid[name] for name in same if name in self._valid}
+        same = self._valid.keys() - {path[0] for path in settings}
+        data |= {name: self._valid[name] for name in same if data[name] == self.case_keys[name]}
         try:
             with reading(self.records):
-                case = Case.model_validate(data)
-            self._valid |= {name: getattr(case, name) for name in same}
-            return case
+                return Case.model_validate(data)
         except ValidationError as error:
             for each in error.errors(include_url=False):
                 path = tuple(map(str, each["loc"]))
@@ -123,6 +118,14 @@ class Plan:
         except CaseError as error:
             return error.problems
         return ()
+
+
+def _valid_tables(data: dict[str, Any]) -> Iterator[tuple[str, Table]]:
+    """The tables of a case that are right by themselves."""
+    for name, given in data.items():
+        if (kind := tables_within(Case).get((name,))) is not None:
+            with suppress(ValidationError):
+                yield name, kind.model_validate(given)
 
 
 def _tables(data: dict[str, Any]) -> dict[str, Any]:

@@ -146,7 +146,7 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     """
     if plan.followed is not None:
         return np.concatenate([_line(plan, unit) for unit in range(first, first + count)])
-    records = list[NDArray[Any]]()
+    records = np.zeros(count, record_type(plan))
     for start in range(first, first + count, TOGETHER):
         points = [begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
         ready = [each for each in points if isinstance(each, Begun)]
@@ -154,8 +154,10 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         with within_range():
             found = zip(certify_together(systems), theories_of(systems), strict=True)
         known = dict(zip(map(id, ready), found, strict=True))
-        records += [computed(plan, each, *known.get(id(each), ()))[0] for each in points]
-    return np.concatenate(records)
+        for place, each in enumerate(points, start - first):
+            record, _ = computed(plan, each, *known.get(id(each), ()))
+            records[place] = record[0]
+    return records
 
 
 def _line(plan: Plan, unit: int) -> NDArray[Any]:

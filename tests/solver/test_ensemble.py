@@ -142,6 +142,7 @@ def test_what_a_lane_cannot_compute_leaves_it(changes: dict[str, Any]) -> None:
     [
         {"roughness__wheel": None},
         {"initial__vx": 2.0},  # as fast as the wheel
+        {"nodes": 127},  # of which one has none opposite
         {"wheel__angular_speed": None, "wheel__times": [0.0, 0.02], "wheel__angular_speeds": [4.0, 5.0]},
         {"roughness__wheel": {"amplitudes": [1e-6] * 6, "wavelengths": [0.01] * 6}},
     ],

@@ -2,16 +2,21 @@
 
 import math
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 import pytest
+from numba import void
 from scipy.linalg import expm
 
 from brakecli.runs.own_error import Known
 from brakecli.runs.together import SAFETY
-from brakecli.solver.ensemble import fits, run_together
-from brakecli.solver.lanes.records import LANES
+from brakecli.solver.compile import Floats, kernel
+from brakecli.solver.ensemble import filled, fits, run_together, shared
+from brakecli.solver.lanes import _touch
+from brakecli.solver.lanes.carried import _leave_out
+from brakecli.solver.lanes.records import DISTURBED, LANE_TYPE, LANES, SHARED, Shared
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.system import System
@@ -33,6 +38,59 @@ def true_errors(run: Motion) -> np.ndarray:
     """The largest deviation from an event-driven run, of each component relative to its largest value."""
     exact = solve(replace(run.system, start_error=None), Method("event-driven", tolerance=1e-9)).rows[:, :4]
     return np.asarray(np.abs(run.rows[:, :4] - exact).max(axis=0) / np.abs(exact).max(axis=0))
+
+
+@kernel(void(LANE_TYPE, SHARED))
+def evaluate(o: Any, shared: Shared) -> None:
+    """The contact at `at_x` and `at_y` at t = 0, with what its nodes leave out."""
+    _touch(o, shared, 0.0)
+    _leave_out(o, shared)
+
+
+def gaps(system: System, x: float, y: float) -> Floats:
+    """Means over the cells of the pad, m."""
+    spacing = 2.0 * system.half_length / system.nodes
+    xi = -system.half_length + spacing * (np.arange(system.nodes) + 0.5)
+    shoe, wheel = (
+        (f.g * np.sinc(f.omega * spacing / (2.0 * np.pi))) @ np.sin(np.outer(f.omega, places) + f.phase[:, None])
+        for f, places in ((system.shoe, xi), (system.wheel, xi + x))
+    )
+    return np.asarray(wheel - shoe - y)
+
+
+def left_out(gap: Floats) -> float:
+    """What the midpoint rule leaves out, in spacings: see `contact.midpoint.left_out`."""
+    total = 0.0
+    for one, other in pairwise(gap):
+        total += (one + other) ** 2 / (8.0 * abs(one - other)) if one * other < 0.0 else 0.0
+    for before, middle, after in zip(gap[:-2], gap[1:-1], gap[2:], strict=True):
+        bend = before - 2.0 * middle + after
+        if min(before * middle, middle * after) > 0.0 and 6.0 * abs(middle) < abs(bend) and bend * middle > 0.0:
+            extreme = middle - bend / 24.0 - (after - before) ** 2 / (8.0 * bend)
+            total += 4.0 / 3.0 * abs(extreme) * math.sqrt(2.0 * abs(extreme / bend)) * (extreme * middle < 0.0)
+    return total
+
+
+def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
+    """Also where the pad opens at its very end, at which there is one neighbour only, and in its middle."""
+    each, rng, found = system(nodes=64), np.random.default_rng(11), list[tuple[float, float]]()
+    alike, spacing = shared(each, DISTURBED, DISTURBED), 2.0 * each.half_length / each.nodes
+    for _ in range(20):
+        o, places = filled([each] * LANES), rng.uniform(-0.01, 0.01, LANES)
+        for n, x in enumerate(places):
+            level = gaps(each, x, 0.0)
+            o.at_x[n], near = x, level[rng.choice([0, 1, 31, 32, 62, 63])]
+            o.at_y[n] = rng.choice([rng.uniform(level.min(), level.max()), near + 1e-12, near - 1e-12])
+        evaluate(o, alike)
+        for n, x in enumerate(places):
+            gap = gaps(each, x, o.at_y[n])
+            assert o.found[n] == pytest.approx(
+                each.layer_stiffness * spacing * gap[gap > 0.0].sum(), rel=1e-9, abs=1e-9
+            )
+            found.append((o.missing[n], each.layer_stiffness * spacing * left_out(gap)))
+    ours, expected = np.transpose(found)
+    assert ours == pytest.approx(expected, rel=1e-9, abs=1e-9 * expected.max())
+    assert np.count_nonzero(expected) > 0.9 * len(expected)
 
 
 def test_an_error_of_the_start_grows_as_the_matrix_exponential_says() -> None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -61,10 +61,15 @@ class Part:
         number = int(state)  # which NumPy compares in half the time
         return sum(np.count_nonzero(piece == number) for piece in self.pieces("state")) / (self.stop - self.start)
 
+    def always(self, state: ContactState) -> bool:
+        """Whether all samples are in a state of the contact; mostly the first one shows that they are not."""
+        number = int(state)
+        return all(piece[0] == number and bool((piece == number).all()) for piece in self.pieces("state"))
+
     def extremes(self, name: str) -> tuple[float, float]:
         """Least and largest value of a variable."""
-        bounds = [(float(piece.min()), float(piece.max())) for piece in self.pieces(name)]
-        return min(bounds)[0], max(largest for _, largest in bounds)
+        bounds = [(np.minimum.reduce(piece), np.maximum.reduce(piece)) for piece in self.pieces(name)]
+        return float(min(bounds)[0]), float(max(largest for _, largest in bounds))
 
     def amplitude(self, name: str) -> float:
         """Half of peak to peak of a variable."""
@@ -82,7 +87,7 @@ class Part:
 
     def slides(self, slip: ContactState | None) -> bool:
         """Whether the whole pad touches and the shoe slips to this side (None: to any) at all of the samples."""
-        if slip is not None and self.fraction(slip) < 1.0:
+        if slip is not None and not self.always(slip):
             return False
         return self.extremes("contact_fraction")[0] >= _FULL
 
@@ -190,12 +195,20 @@ def _near(lines: Sequence[float], frequencies: NDArray[Any], bins: int = LINE_BI
     return chosen
 
 
-def line(x: Array, y: Array) -> tuple[float, float]:
-    """Slope of the line through some points, by least squares, and its standard error."""
-    away, rest = x - x.mean(), y - y.mean()
-    slope = float(away @ rest / (away @ away))
+@lru_cache(maxsize=4)
+def _evenly(count: int) -> tuple[Array, float]:
+    """Times of evenly spaced values in a record of length one, from its middle, and the sum of their squares."""
+    time = (np.arange(count) + 0.5) / count
+    away = time - time.mean()
+    return away, float(away @ away)
+
+
+def trend(values: Array) -> tuple[float, float]:
+    """Change of evenly spaced values over their record, by a line of least squares, and its standard error."""
+    (away, squares), rest = _evenly(len(values)), values - values.mean()
+    slope = float(away @ rest / squares)
     rest = rest - slope * away
-    return slope, math.sqrt(float(rest @ rest / (away @ away)) / (len(x) - 2))
+    return slope, math.sqrt(float(rest @ rest / squares) / (len(values) - 2))
 
 
 def windowed(values: Array) -> Array:
@@ -215,7 +228,19 @@ def level_change(levels: Array) -> tuple[float, float]:
     means = levels[len(levels) % batches :].reshape(batches, -1).mean(axis=1)
     if not means.min() > 0.0:
         return math.nan, math.nan
-    return line((np.arange(batches) + 0.5) / batches, np.log(means))
+    return trend(np.log(means))
+
+
+def _final(values: Array) -> float:
+    """Mean of the last windows."""
+    return float(np.add.reduce(values[_LAST])) / 10.0
+
+
+@lru_cache(maxsize=4)
+def _windows(samples: int) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.int_]]:
+    """The samples that begin equal windows, how many each holds, and where the window of each sample begins."""
+    edges = np.linspace(0, samples, WINDOWS + 1).astype(int)
+    return edges[:-1], np.diff(edges), np.repeat(edges[:-1], np.diff(edges))
 
 
 class Envelope:
@@ -223,25 +248,25 @@ class Envelope:
 
     def __init__(self, history: History) -> None:
         """Take a history of at least `FEWEST_SAMPLES`."""
-        edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
         if history.samples > LONGEST:
+            edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
             windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
             self.vx, *self._x = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows]).T
         else:
             x, vx = (history.read(name, 0, history.samples) for name in ("x", "vx"))
-            starts, counts = edges[:-1], np.diff(edges)
+            starts, counts, firsts = _windows(history.samples)
             self._x = [each.reduceat(x, starts) for each in (np.minimum, np.maximum)]
-            away = vx - np.repeat(vx[starts], counts)
+            away = vx - vx[firsts]
             mean, square = (np.add.reduceat(each, starts) / counts for each in (away, away * away))
             self.vx = np.sqrt(np.maximum(square - mean**2, 0.0))
-        self.final, self.largest = float(np.mean(self.vx[_LAST])), float(self.vx.max())
+        self.final, self.largest = _final(self.vx), float(self.vx.max())
 
     def settled_window(self, within: float, reach: float) -> int | None:
         """The window, never the first, from which on all are settled; None if fewer than ten are."""
         settled = np.abs(self.vx - self.final) <= within * self.final
         least, largest = self._x
-        span = float(np.mean((largest - least)[_LAST]))
+        span = _final(largest - least)
         for bound in self._x:
-            settled &= np.abs(bound - np.mean(bound[_LAST])) <= reach * span
+            settled &= np.abs(bound - _final(bound)) <= reach * span
         first = WINDOWS - int(np.argmin(settled[::-1])) if not settled.all() else 1
         return first if first <= WINDOWS - 10 else None

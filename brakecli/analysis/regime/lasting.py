@@ -10,7 +10,7 @@ import numpy as np
 
 from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
-from brakecli.analysis.regime.evidence import WINDOWS, Part, line
+from brakecli.analysis.regime.evidence import WINDOWS, Part, trend
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.spectrum import Array
@@ -146,9 +146,9 @@ def _gone(shown: Shown, decay: float, own: Array, forced: float) -> tuple[int, f
     starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
     left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
     end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
-    slope = line(np.arange(0.5 * WINDOWS), np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
-    lost = decay * shown.duration / WINDOWS
-    stays = 0.25 * WINDOWS * lost > _RELAXED and slope > -0.25 * lost
+    change = trend(np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
+    lost = 0.5 * decay * shown.duration
+    stays = 0.5 * lost > _RELAXED and change > -0.25 * lost
     level = shown.limits.settled_within * forced
     if end < _REST * forced and stays:
         level = max(level, 1.2 * end)

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -106,14 +106,12 @@ class Shown:
 
     def beat(self, amplitude: float = 0.0) -> float:
         """Period (s) of the slowest wave, or of the slowest beat of one that counts with a multiple of another."""
-        slow, counts = self.slowest(amplitude), self._counting(amplitude)
-        beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
-        return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
+        return _beat(self._counting(amplitude))
 
-    def _counting(self, amplitude: float) -> list[float]:
+    def _counting(self, amplitude: float) -> tuple[float, ...]:
         """Frequencies (Hz) of the waves that count beside an amplitude of x (m) and beside the others."""
         least = max([amplitude, *(swing for _, swing in self.context.waves)])
-        return [f for f, swing in self.context.waves if swing >= self.limits.settled_within * least]
+        return tuple([f for f, swing in self.context.waves if swing >= self.limits.settled_within * least])
 
     def changes(self) -> float:
         """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
@@ -132,6 +130,14 @@ class Shown:
         return found | errors
 
 
+@lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
+def _beat(counts: tuple[float, ...]) -> float:
+    """Period (s) of the slowest of some waves (Hz), or of the slowest beat of one with a multiple of another."""
+    slow = 1.0 / min(counts) if counts else 0.0
+    beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
+    return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
+
+
 def answers(
     shown: Shown, exponent: Exponent | None, continued: Callable[[], Continued], failure: str = ""
 ) -> Answers:
@@ -140,7 +146,7 @@ def answers(
     context, history, half, last = shown.context, shown.history, shown.half, shown.last
     stands, waves = context.belt_speed == 0.0, bool(context.forced)
     away, stick = ContactState.SEPARATED, ContactState.STICK
-    lost = half.fraction(away) == 1.0
+    lost = half.always(away)
     found: dict[str, Any] = {
         "failure": failure or "",
         "duration": shown.duration,
@@ -153,10 +159,10 @@ def answers(
         "undamped": context.undamped,
         "locks": math.nan if context.locks is None else context.locks,
         "held": context.held,
-        "never": lost and shown.whole.fraction(away) == 1.0,
+        "never": lost and shown.whole.always(away),
         "lost": lost,
-        "left": last.fraction(away) == 1.0,
-        "carried": (last if stands else half).fraction(stick) == 1.0,
+        "left": last.always(away),
+        "carried": (last if stands else half).always(stick),
     }
     if exponent is not None:
         found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))

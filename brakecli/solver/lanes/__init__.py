@@ -14,10 +14,21 @@ import numpy as np
 from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped
+from brakecli.solver.compile import Floats, borrowed, kernel, stopped
 from brakecli.solver.friction import observed
 from brakecli.solver.lanes.carried import carry, renew
-from brakecli.solver.lanes.records import LANE_TYPE, LANES, SHARED, THETA_1, THETA_2, THETA_3, WAVES, Shared
+from brakecli.solver.lanes.records import (
+    ALIKE,
+    LANE_TYPE,
+    LANES,
+    PAIR,
+    SHARED,
+    THETA_1,
+    THETA_2,
+    THETA_3,
+    WAVES,
+    Shared,
+)
 from brakecli.solver.quantities import BOUND
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.sine import sine_cosine
@@ -26,7 +37,7 @@ _PAIR = types.UniTuple(float64, 2)
 _MOST = 8  # evaluations of the contact in a step
 
 
-@kernel(void(LANE_TYPE, SHARED, int64, float64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, int64, float64), fastmath=ALIKE)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
     """Sine and cosine of a wave of the wheel."""
     omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
@@ -36,37 +47,42 @@ def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
         o.sine[i, n], o.cosine[i, n] = sine_cosine(angle)
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _add_nodes(o: Any, shared: Shared) -> None:
-    """The midpoint sum of the gaps (m), and how many nodes touch."""
-    table, at = shared.table, 0
+    """The midpoint sum of the gaps (m), how many nodes touch, and the gaps themselves.
+
+    What is even in f2 and what is odd give two opposite gaps from the table of one node.
+    """
+    table, gaps, at, pair = shared.table, shared.gaps, 0, 2 * PAIR
     for n in range(LANES):
         o.found[n] = o.touches[n] = 0.0
-    for _ in range(shared.nodes):
-        f1, s_0, s_1, s_2 = table[at], table[at + 1], table[at + 2], table[at + 3]
-        s_3, s_4, c_0, c_1 = table[at + 4], table[at + 5], table[at + 6], table[at + 7]
-        c_2, c_3, c_4 = table[at + 8], table[at + 9], table[at + 10]
-        at += 11
+    for _ in range(shared.nodes // 2):
+        f1, opposite, s_0, s_1, s_2 = table[at], table[at + 1], table[at + 2], table[at + 3], table[at + 4]
+        s_3, s_4, c_0, c_1, c_2 = table[at + 5], table[at + 6], table[at + 7], table[at + 8], table[at + 9]
+        c_3, c_4 = table[at + 10], table[at + 11]
         for n in range(LANES):
-            gap = o.cosine[0, n] * s_0 + o.sine[0, n] * c_0 + o.cosine[1, n] * s_1 + o.sine[1, n] * c_1
-            gap += o.cosine[2, n] * s_2 + o.sine[2, n] * c_2 + o.cosine[3, n] * s_3 + o.sine[3, n] * c_3
-            gap += o.cosine[4, n] * s_4 + o.sine[4, n] * c_4 - f1 - o.at_y[n]
-            o.found[n] += gap if gap > 0.0 else 0.0
-            o.touches[n] += 1.0 if gap > 0.0 else 0.0
+            odd = o.cosine[0, n] * s_0 + o.cosine[1, n] * s_1 + o.cosine[2, n] * s_2 + o.cosine[3, n] * s_3
+            even = o.sine[0, n] * c_0 + o.sine[1, n] * c_1 + o.sine[2, n] * c_2 + o.sine[3, n] * c_3
+            odd, even = odd + o.cosine[4, n] * s_4, even + o.sine[4, n] * c_4 - o.at_y[n]
+            one, other = even + odd - f1, even - odd - opposite
+            o.found[n] += (one if one > 0.0 else 0.0) + (other if other > 0.0 else 0.0)
+            o.touches[n] += (1.0 if one > 0.0 else 0.0) + (1.0 if other > 0.0 else 0.0)
+            gaps[pair + n], gaps[pair + LANES + n] = one, other
+        at, pair = at + 12, pair + PAIR
 
 
-@kernel(void(LANE_TYPE, SHARED, float64), fastmath=FAST, inlined=False)
+@kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE, inlined=False)
 def _touch(o: Any, shared: Shared, t: float) -> None:
     """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
     shared = borrowed(shared)
     waves, length, full, clear = shared.waves, shared.length, shared.full_up_to, shared.clear_from
     for i in range(WAVES):
         _pass(o, shared, i, t)
-    some = 0.0
+    partly = 0
     for n in range(LANES):
         o.partly[n] = 1.0 if full < o.at_y[n] and o.at_y[n] < clear else 0.0
-        some += o.partly[n]
-    if some > 0.0:
+        partly |= 1 if o.partly[n] > 0.0 else 0
+    if partly:
         _add_nodes(o, shared)
     g_0, g_1, g_2, g_3, g_4 = waves[2], waves[5], waves[8], waves[11], waves[14]
     spacing, part = length / shared.nodes, 1.0 / shared.nodes
@@ -114,7 +130,7 @@ def _begin(o: Any, shared: Shared) -> None:
         o.earlier[n] = 2.0 * o.before[n] - o.force[n]
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _prepare(o: Any, shared: Shared) -> None:
     """The known part of (6) and (7) over three levels, and the guess of the force as in `loop.advance`.
 
@@ -138,7 +154,7 @@ def _prepare(o: Any, shared: Shared) -> None:
         o.done[n] = o.out[n]
 
 
-@kernel(void(LANE_TYPE, SHARED, float64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE)
 def _iterate(o: Any, shared: Shared, t: float) -> None:
     """The force of the next level in `guess`: as (13), until what is left is below the bound."""
     h = shared.h
@@ -150,15 +166,15 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
             o.at_x[n] = x if o.done[n] == 0.0 else o.at_x[n]
             o.at_y[n] = y if o.done[n] == 0.0 else o.at_y[n]
         _touch(o, shared, t)
-        left = 0.0
+        left = 0
         for n in range(LANES):
             waits, change = 1.0 - o.done[n], abs(o.found[n] - o.guess[n])
             near = o.guess[n] + (o.found[n] - o.guess[n]) / (1.0 + o.answer[n] * o.touches[n])  # Newton's method
             o.guess[n] = near if waits > 0.0 else o.guess[n]
             o.evaluations[n] += waits
             o.done[n] = 1.0 if change <= o.limit[n] else o.done[n]
-            left += 1.0 - o.done[n]
-        if left == 0.0:
+            left |= 1 if o.done[n] == 0.0 else 0
+        if not left:
             return
 
 
@@ -178,7 +194,7 @@ def _finish(o: Any, shared: Shared) -> None:
         o.closed[n] += 1.0 - o.partly[n]
 
 
-@kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], int64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], int64), fastmath=ALIKE)
 def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
     """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative."""
     h = shared.h
@@ -212,10 +228,10 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) ->
         _sample(o, shared, rows, number)
         if sizes.shape[0] > 0:
             renew(o, shared, sizes, number, rows.shape[2] - 1)
-        left = 0.0
+        left = 0
         for n in range(LANES):
-            left += 1.0 - o.out[n]
-        if number == rows.shape[2] - 1 or left == 0.0 or stopped(shared.signals):
+            left |= 1 if o.out[n] == 0.0 else 0
+        if number == rows.shape[2] - 1 or not left or stopped(shared.signals):
             return
         for step in range(shared.per_sample):
             _prepare(o, shared)

@@ -9,14 +9,16 @@ Of the nodes it is what `contact.midpoint.left_out` finds at every second level.
 import math
 from typing import Any
 
-from numba import float64, int64, void
+from numba import boolean, float64, int64, types, void
 
-from brakecli.solver.compile import FAST, Floats, kernel
+from brakecli.solver.compile import Floats, kernel, vector
 from brakecli.solver.lanes.records import (
+    ALIKE,
     DISTURBED,
     LANE_TYPE,
     LANES,
     NODES,
+    PAIR,
     SHARED,
     STEPS,
     THETA_1,
@@ -33,7 +35,7 @@ NEAR = 3.0
 """Sliding velocity over its error, from which on a stick may have been missed."""
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _miss(o: Any, shared: Shared) -> None:
     """What the motion misses of (6) and (7) with steps twice as long, between the last three even levels."""
     h = 2.0 * shared.h
@@ -63,7 +65,7 @@ def _miss(o: Any, shared: Shared) -> None:
         o.source_y[n] = 2.0 / _MORE * (y_side - o.load[n] * o.cos_beta[n] - o.m[n] * a_y)
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _begin(o: Any, shared: Shared) -> None:
     """At the second level: the error of the first one, by a start with a step twice as long."""
     h = 2.0 * shared.h
@@ -83,47 +85,61 @@ def _begin(o: Any, shared: Shared) -> None:
         o.even_force[1, n], o.even_force[0, n] = o.even_force[0, n], o.force[n]
 
 
-@kernel(void(LANE_TYPE), fastmath=FAST, inlined=False)
-def _edge(o: Any) -> None:
-    """Add what the last cells leave out, in spacings: at an edge, or in a patch between nodes."""
+@kernel(boolean(float64, float64, float64), fastmath=ALIKE)
+def _hides(before: float, gap: float, after: float) -> bool:
+    """Whether the gap in the middle is so near zero beside its bend that a patch, or a hole, may lie beside it."""
+    return before * gap + after * gap > 8.0 * gap * gap and before * gap > 0.0 and after * gap >= 0.0
+
+
+@kernel(void(LANE_TYPE, vector, int64), fastmath=ALIKE, inlined=False)
+def _add_hidden(o: Any, gaps: Floats, at: int) -> None:
+    """Add what three nodes leave out, in spacings: a patch, or a hole, between them."""
     for n in range(LANES):
-        gap, bend = o.gap[n] - o.rise[n], o.bend[n]
-        before = gap - o.rise[n] + bend
-        if o.gap[n] * gap < 0.0:
-            o.missing[n] += 0.125 * (o.gap[n] + gap) ** 2 / abs(o.rise[n])
-        elif 6.0 * abs(gap) < abs(bend) and bend * gap > 0.0 and gap * before > 0.0:
-            extreme = gap - bend / 24.0 - 0.125 * (o.gap[n] - before) ** 2 / bend
-            if extreme * gap < 0.0:
-                o.missing[n] += 4.0 / 3.0 * abs(extreme) * math.sqrt(2.0 * abs(extreme / bend))
+        before, gap, after = gaps[at + n], gaps[at + PAIR + n], gaps[at + 2 * PAIR + n]
+        bend = before - 2.0 * gap + after
+        inverse = 1.0 / bend if bend != 0.0 else 0.0
+        extreme = gap - bend / 24.0 - 0.125 * (after - before) ** 2 * inverse
+        size = 4.0 / 3.0 * abs(extreme) * math.sqrt(2.0 * abs(extreme * inverse))
+        o.missing[n] += size if _hides(before, gap, after) and extreme * gap < 0.0 else 0.0
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=FAST, inlined=False)
+@kernel(types.UniTuple(float64, 2)(float64, float64), fastmath=ALIKE)
+def _cut(gap: float, after: float) -> tuple[float, float]:
+    """What a cell with an edge leaves out, over an eighth of a spacing, as a fraction; 0/1 without one."""
+    return ((after + gap) ** 2, abs(after - gap)) if after * gap < 0.0 else (0.0, 1.0)
+
+
+@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE, inlined=False)
 def _leave_out(o: Any, shared: Shared) -> None:
-    """`contact.midpoint.left_out` of pads that touch in part, where the contact was evaluated last."""
-    table, at, part = shared.table, 0, shared.length / shared.nodes
+    """`contact.midpoint.left_out` of pads that touch in part, where the contact was evaluated last.
+
+    From both ends to the middle, where both halves find an edge: a pair of two such cells takes one division.
+    """
+    gaps, at, half, part = shared.gaps, 0, shared.nodes // 2, shared.length / shared.nodes
+    last = (1 + half) * PAIR
     for n in range(LANES):
-        o.missing[n] = o.gap[n] = o.rise[n] = 0.0
-    for _ in range(shared.nodes):
-        f1, s_0, s_1, s_2 = table[at], table[at + 1], table[at + 2], table[at + 3]
-        s_3, s_4, c_0, c_1 = table[at + 4], table[at + 5], table[at + 6], table[at + 7]
-        c_2, c_3, c_4 = table[at + 8], table[at + 9], table[at + 10]
-        at += 11
-        some = 0.0
+        gaps[last + PAIR + n], gaps[last + PAIR + LANES + n] = gaps[last + LANES + n], gaps[last + n]
+        o.missing[n] = 0.0
+    for pair in range(half + 1):
+        share, hidden = 0.125 if pair < half else 0.0625, 0
         for n in range(LANES):
-            gap = o.cosine[0, n] * s_0 + o.sine[0, n] * c_0 + o.cosine[1, n] * s_1 + o.sine[1, n] * c_1
-            gap += o.cosine[2, n] * s_2 + o.sine[2, n] * c_2 + o.cosine[3, n] * s_3 + o.sine[3, n] * c_3
-            gap += o.cosine[4, n] * s_4 + o.sine[4, n] * c_4 - f1 - o.at_y[n]
-            change, cut = gap - o.gap[n], gap * o.gap[n] < 0.0
-            bend = change - o.rise[n]
-            some += (1.0 if cut else 0.0) + (1.0 if 6.0 * abs(o.gap[n]) < abs(bend) else 0.0)
-            o.bend[n], o.rise[n], o.gap[n] = bend, change, gap
-        if some > 0.0:
-            _edge(o)
+            before, gap, after = gaps[at + n], gaps[at + PAIR + n], gaps[at + 2 * PAIR + n]
+            one, over = _cut(gap, after)
+            hidden |= 1 if _hides(before, gap, after) else 0
+            before, gap, after = gaps[at + LANES + n], gaps[at + PAIR + LANES + n], gaps[at + 2 * PAIR + LANES + n]
+            other, under = _cut(gap, after)
+            hidden |= 1 if _hides(before, gap, after) else 0
+            both = over * under
+            o.missing[n] += share * (one * under + other * over) / both if both != 0.0 else 0.0
+        if hidden:
+            _add_hidden(o, gaps, at)
+            _add_hidden(o, gaps, at + LANES)
+        at += PAIR
     for n in range(LANES):
         o.missing[n] = part * o.k[n] * o.missing[n] if o.partly[n] > 0.0 else 0.0
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _contact(o: Any, shared: Shared) -> None:
     """The derivative of the contact force at the older level of the motion.
 
@@ -142,7 +158,7 @@ def _contact(o: Any, shared: Shared) -> None:
         o.feedback[n] = 1.0 / feedback if feedback != 0.0 else 0.0
 
 
-@kernel(void(LANE_TYPE, SHARED, int64), fastmath=FAST)
+@kernel(void(LANE_TYPE, SHARED, int64), fastmath=ALIKE)
 def _move(o: Any, shared: Shared, kind: int) -> None:
     """Carry one of them to the older level of the motion, by the derivative of its steps."""
     h, by_steps, by_nodes = shared.h, 1.0 if kind == STEPS else 0.0, 2.0 if kind == NODES else 0.0
@@ -181,7 +197,7 @@ def _size(error: float) -> float:
     return abs(error) if abs(error) < math.inf else math.inf
 
 
-@kernel(void(LANE_TYPE), fastmath=FAST)
+@kernel(void(LANE_TYPE), fastmath=ALIKE)
 def _note(o: Any) -> None:
     """The largest errors, and whether the shoe may have stuck for less than a step.
 
@@ -213,18 +229,21 @@ def carry(o: Any, shared: Shared, step: int) -> None:
     even, own = step % 2 == 0, shared.first == STEPS
     if own and even and step > 0:
         _miss(o, shared)
-    for kind in range(shared.first, shared.beyond):
-        _move(o, shared, kind)
+    if own:  # by kinds that the compiler knows: otherwise it takes one lane at a time
+        _move(o, shared, STEPS)
+        _move(o, shared, NODES)
+    if shared.beyond > DISTURBED:
+        _move(o, shared, DISTURBED)
     if not own:
         return
     if step == 0:
         _begin(o, shared)
     _note(o)
-    some = 0.0
+    partly = 0
     for n in range(LANES):
         o.source_x[n] = o.source_y[n] = o.missing[n] = 0.0
-        some += o.partly[n]
-    if even and some > 0.0:
+        partly |= 1 if o.partly[n] > 0.0 else 0
+    if even and partly:
         _leave_out(o, shared)
 
 

@@ -5,12 +5,17 @@ from typing import Any, NamedTuple
 import numba
 from numba import float64, int64, types
 
-from brakecli.solver.compile import Floats, vector
+from brakecli.solver.compile import FAST, Floats, vector
 from brakecli.solver.records import Coefficients, record
 from brakecli.solver.schemes import NUMEROV
 
 LANES, WAVES = 16, 5
 """Runs side by side, and waves of the wheel, at most."""
+ALIKE = FAST - {"reassoc"}
+"""What lanes allow. With sums in any order the compiler would choose another one for each half of the lanes: a run
+would depend on its lane."""
+PAIR = 2 * LANES
+"""Gaps of all lanes at two opposite nodes."""
 THETA_1, THETA_2, THETA_3 = NUMEROV
 STEPS, NODES, DISTURBED = range(3)
 """What is carried along: the errors by steps and by nodes, and a disturbance."""
@@ -40,7 +45,6 @@ LANE = record(
     **_lanes("t_kept"),  # part of a disturbance that is left at a sample
     **_lanes("even_x even_y even_force even_d even_e", 3),  # at the last even levels, the youngest first
     **_lanes("source_x source_y missing"),  # what steps miss of (6) and (7), and nodes of the force, N
-    **_lanes("gap rise bend"),  # at a node, from the node before, and of the last three nodes
     **_lanes("change"),  # of d in the last step
     **_lanes("unsure"),  # 1 where a stick may have been missed
     worst=(float, (3, 4, LANES)),  # largest errors of x, y, vx and vy: by steps, by nodes, and both
@@ -60,10 +64,11 @@ class Shared(NamedTuple):
     clear_from: float
     shoe_mean: float
     waves: Floats  # of each: wavenumber, phase, and its part of the force in full contact over k sin, m²
-    table: Floats  # of each node: f1, and g sin(ωξ), g cos(ωξ) of all waves
+    table: Floats  # of each node of the first half: f1, f1 opposite, and g sin(ωξ), g cos(ωξ) of all waves
+    gaps: Floats  # m, by pairs, where nodes were summed last; two pairs of zeros before, and room for one behind
     signals: int
     first: int  # kind of what is carried along
     beyond: int  # the kind behind the last one that is
 
 
-SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, vector, vector, *[int64] * 3], Shared)
+SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, *[vector] * 3, *[int64] * 3], Shared)
