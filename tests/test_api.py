@@ -115,6 +115,9 @@ def test_modes_follow_a_key_as_in_the_command() -> None:
     found = brakecli.stability(CASE, vary={"link2.angle_deg": np.linspace(1, 10, 4)})
     assert found.sizes == {"link2_angle_deg": 4, "mode": 2}
     assert found.frequencies.values.tolist() == [each["frequencies"] for each in printed["vary"]]
+    assert brakecli.stability(CASE, vary={"link2.angle_deg": {"start": 1, "stop": 10, "num": 4}}).identical(found)
+    with pytest.raises(UsageError, match="rise or fall"):
+        brakecli.stability(CASE, vary={"link2.angle_deg": {"start": 1.0, "stop": 1.0, "num": 4}})
     with pytest.raises(UsageError, match="one key"):
         brakecli.stability(CASE, vary={})
 

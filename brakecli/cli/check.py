@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import is_sweep, load_case, load_sweep
+from brakecli.cli.inputs import kind_of_file, load_case, load_sweep
 from brakecli.cli.options import AsJson, ForceRead, Overrides, Quiet, source_argument
 from brakecli.cli.output import show_result, warn
 
@@ -19,7 +19,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Validate a case or a sweep; estimate its cost and limits."""
-    if is_sweep(file):
+    if kind_of_file(file) == "sweep":
         sweep = load_sweep(file, overrides)
         from brakecli.cli.tables import estimate_table
         from brakecli.runs.limits import free_bytes

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.inputs import as_argument, is_sweep
+from brakecli.cli.inputs import COMMANDS, as_argument, kind_of_file
 from brakecli.cli.measured import UNMEASURED, Measured, with_measured
 from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
@@ -37,7 +37,8 @@ def command(
     """Draw a result, or a measured signal (needs matplotlib)."""
     target = output or Path(f"{Path(result).stem}.png")
     if Path(result).suffix == ".toml":
-        remedy = f"run it first, with: brakecli {'sweep' if is_sweep(result) else 'run'} {as_argument(result)}"
+        computes = COMMANDS.get(kind_of_file(result), "run")
+        remedy = f"run it first, with: brakecli {computes} {as_argument(result)}"
         raise UsageError(f"{result}: is no result yet; {remedy}")
     if measured.quantity_of(result) is not None:
         if select or variable or section:
