@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from brakecli.accessor import Advice, Differences
     from brakecli.case.read import LoadedCase
     from brakecli.front.measured import Measured
+    from brakecli.scattering.study import LoadedStudy
     from brakecli.solver.motion import Counted
     from brakecli.sweeps.listed import Listed
     from brakecli.sweeps.plan import LoadedSweep
@@ -42,10 +43,10 @@ if TYPE_CHECKING:
 
 
 def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, force_read: bool = False) -> Any:
-    """What a file holds: a case or a sweep, for the other functions, or a result as an `xarray.DataTree`.
+    """What a file holds: a case, a sweep or a study, for the other functions, or a result as an `xarray.DataTree`.
 
     Args:
-        source: path of a case file, a sweep file, or a result file.
+        source: path of a case file, a sweep file, a study, or a result file of any kind.
         settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; of a result none.
         force_read: look at a result whose digest does not fit; its attribute `digest` and a warning say so.
 
@@ -53,7 +54,7 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, f
         CaseError: the case or a setting is wrong; holds every problem.
         UnreadableResultError: the result is damaged or of another program.
     """
-    from brakecli.front.inputs import is_result, is_sweep, load_case, load_sweep
+    from brakecli.front.inputs import is_result, kind_of_file, load_case, load_study, load_sweep
 
     name = str(source)
     with in_python(), _readings(force_read=force_read):
@@ -63,7 +64,8 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, f
             from brakecli.files.as_xarray import opened
 
             return opened(Path(name))
-        return (load_sweep if is_sweep(name) else load_case)(name, _overrides(settings))
+        kinds: dict[str, Callable[[str, list[str]], Any]] = {"sweep": load_sweep, "study": load_study}
+        return kinds.get(kind_of_file(name), load_case)(name, _overrides(settings))
 
 
 def run(
@@ -111,7 +113,7 @@ def stability(
     case: "Source",
     settings: "Settings | None" = None,
     *,
-    vary: "Mapping[str | tuple[str, ...], Iterable[float]] | None" = None,
+    vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings] | None" = None,
     progress: "Progress" = False,
 ) -> "xr.Dataset":
     """Critical friction, modes and growth of steady sliding, and from which friction on a vibration can exist.
@@ -120,7 +122,8 @@ def stability(
         case: path of a case file or of a result, or what `load` gave.
         settings: keys of the case to change.
         vary: one key, or several that take the same value, with values that rise or fall, as
-            `{"friction.coefficient": np.linspace(0, 1, 101)}`: follows both modes along them.
+            `{"friction.coefficient": np.linspace(0, 1, 101)}`: follows both modes along them. A range is written
+            as in a sweep: `{"friction.coefficient": {"start": 0, "stop": 1, "num": 101}}`.
         progress: as for `run`.
 
     Returns:
@@ -322,7 +325,7 @@ def _scheduler(given: Any) -> Any:
 
 
 def scatter(
-    source: "str | PathLike[str]",
+    source: "str | PathLike[str] | LoadedStudy",
     settings: "Settings | None" = None,
     *,
     output: "str | PathLike[str] | None" = None,
@@ -338,7 +341,7 @@ def scatter(
     that `brakecli scatter --json` prints. Runs need a guard in a script, as `sweep` does.
 
     Args:
-        source: path of a study file.
+        source: path of a study file, or what `load` gave.
         settings: keys of the study to change, as `{"samples": 4096}`, or of its case.
         output: a result file to keep; with it, an interrupted study of runs goes on where it was.
         jobs: worker processes; one for each core if left out.
@@ -352,10 +355,9 @@ def scatter(
     _refuse_jobs(jobs)
     with _interruptible(), _readings(), _target(output) as path, _telling(progress) as tell:
         from brakecli.files.as_xarray import opened
-        from brakecli.front.inputs import load_study
         from brakecli.scattering.scatter import engine_for, scatter
 
-        loaded = load_study(str(source), _overrides(settings))
+        loaded = _study(source, settings)
         engine_of = partial(engine_for, jobs=jobs, scheduler=_scheduler(scheduler), in_caller=True)
         report = scatter(loaded, path, engine_of, force=force, tell=tell)
         if report.failed:
@@ -365,13 +367,24 @@ def scatter(
         return opened(path, own=True).to_dataset()
 
 
+def _study(source: Any, settings: "Settings | None" = None) -> "LoadedStudy":
+    from brakecli.front.inputs import load_study
+    from brakecli.scattering.study import LoadedStudy
+
+    if not isinstance(source, LoadedStudy):
+        return load_study(str(source), _overrides(settings))
+    if settings:
+        raise UsageError("settings: come too late for a study that was loaded; give them to brakecli.load")
+    return source
+
+
 def advise(
     case: "Source",
     settings: "Settings | None" = None,
     *,
     keys: "str | Iterable[str] | None" = None,
     margin: float = 0.2,
-    scatter: "str | PathLike[str] | None" = None,
+    scatter: "str | PathLike[str] | LoadedStudy | None" = None,
     progress: "Progress" = False,
 ) -> "Advice":
     """What moves the critical friction of a case, and what to change so that it does not squeal.
@@ -384,7 +397,8 @@ def advise(
         keys: those that may be advised, with `*` for any part; masses, stiffnesses, dampings, angles and load if
             left out.
         margin: part of its friction by which the case is to stay stable above it, from 0 to 10.
-        scatter: path of a study file: advice is ranked by the probability of squeal that is left.
+        scatter: path of a study file, or what `load` gave: advice is ranked by the probability of squeal that is
+            left.
         progress: as for `run`.
 
     Returns:
@@ -399,7 +413,6 @@ def advise(
         loaded = _case(case, settings)
         from brakecli.accessor import Advice
         from brakecli.analysis.stability.advice import KEYS
-        from brakecli.front.inputs import load_study
         from brakecli.runs.advise import advise
         from brakecli.runs.limits import within_range
         from brakecli.runs.run import load_kernels
@@ -407,7 +420,7 @@ def advise(
         if not (isinstance(margin, int | float) and 0.0 <= margin <= 10.0):
             raise UsageError(f"margin {margin}: is no number from 0 to 10")
         patterns = keys.split(",") if isinstance(keys, str) else KEYS if keys is None else [*map(str, keys)]
-        study = replace(load_study(str(scatter), []), base=loaded) if scatter is not None else None
+        study = replace(_study(scatter), base=loaded) if scatter is not None else None
         load_kernels(loaded)
         with within_range():
             report = advise(loaded, patterns, margin, tell)
@@ -759,7 +772,7 @@ def _toml(value: Any, key: str) -> str:
     return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
 
 
-def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
+def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings]") -> "Axis":
     import tomli_w
 
     from brakecli.case.read import parse_table
@@ -768,8 +781,10 @@ def _axis(vary: "Mapping[str | tuple[str, ...], Iterable[float]]") -> "Axis":
     if len(_mapping(vary, "vary")) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
-    axis = parse_table(Axis, tomli_w.dumps(_plain({"parameter": keys, "values": values}, "vary")), "vary")
-    steps = [after - before for before, after in pairwise(axis.values or ()) if axis.numeric]
+    along = values if isinstance(values, Mapping) else {"values": values}
+    axis = parse_table(Axis, tomli_w.dumps(_plain({"parameter": keys, **along}, "vary")), "vary")
+    places = axis.values or (axis.start or 0.0, axis.stop or 0.0)
+    steps = [after - before for before, after in pairwise(places) if axis.numeric]
     if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
         raise UsageError("vary: modes are followed along numbers that rise or fall; sort them, each once")
     return axis

@@ -115,6 +115,9 @@ def test_modes_follow_a_key_as_in_the_command() -> None:
     found = brakecli.stability(CASE, vary={"link2.angle_deg": np.linspace(1, 10, 4)})
     assert found.sizes == {"link2_angle_deg": 4, "mode": 2}
     assert found.frequencies.values.tolist() == [each["frequencies"] for each in printed["vary"]]
+    assert brakecli.stability(CASE, vary={"link2.angle_deg": {"start": 1, "stop": 10, "num": 4}}).identical(found)
+    with pytest.raises(UsageError, match="rise or fall"):
+        brakecli.stability(CASE, vary={"link2.angle_deg": {"start": 1.0, "stop": 1.0, "num": 4}})
     with pytest.raises(UsageError, match="one key"):
         brakecli.stability(CASE, vary={})
 
@@ -397,12 +400,13 @@ def test_results_in_memory_are_drawn_compared_and_reported_like_their_files(tmp_
     folder.mkdir()
     a = brakecli.run(CASE, SHORT, output=folder / "a.h5")
     b = brakecli.run(CASE, {**SHORT, "friction.coefficient": 0.72}, output=folder / "b.h5")
-    brakecli.plot(a, output=tmp_path / "own.png", variable="x")
-    command("plot", "a.h5", "--variable", "x", "-o", "a.png", cwd=folder).told(0)
-    assert (tmp_path / "own.png").read_bytes() == (folder / "a.png").read_bytes()
+    for name, result in (("own", a), ("a", folder / "a.h5")):
+        brakecli.plot(result, output=tmp_path / f"{name}.png", variable="x")
+    assert (tmp_path / "own.png").read_bytes() == (tmp_path / "a.png").read_bytes()
     printed = command("diff", "a.h5", "b.h5", "-o", "two.png", "--json", cwd=folder).json
-    for pair in ((a, b), (folder / "a.h5", b)):
-        found = brakecli.diff(*pair, output=tmp_path / "two.png", force=True)
+    (tmp_path / "two.png").write_bytes(b"")
+    drawn = brakecli.diff(a, b, output=tmp_path / "two.png", force=True)
+    for found in (drawn, brakecli.diff(folder / "a.h5", b)):
         assert not found.same
         assert found.case == printed["case"]
         assert found.variables == printed["variables"]
@@ -412,8 +416,7 @@ def test_results_in_memory_are_drawn_compared_and_reported_like_their_files(tmp_
     assert brakecli.diff(folder / "a.h5", a).same
     command("stability", CASE, "--vary", "friction.coefficient=0:1:5", "-o", "result.h5", cwd=folder).told(0)
     modes = brakecli.stability(CASE, vary={"friction.coefficient": np.linspace(0.0, 1.0, 5)})
-    command("report", "result.h5", "-o", "page.html", cwd=folder).told(0)
-    page = (folder / "page.html").read_text()
+    page = brakecli.report(folder / "result.h5")
     assert brakecli.report(modes, output=tmp_path / "page.html") == page
     assert (tmp_path / "page.html").read_text() == page
 

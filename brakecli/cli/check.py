@@ -6,7 +6,7 @@ from typing import Annotated
 
 from brakecli.cli.options import AsJson, ForceRead, Overrides, Quiet, source_argument
 from brakecli.cli.output import show_result, warn
-from brakecli.front.inputs import is_sweep, load_case, load_sweep
+from brakecli.front.inputs import kind_of_file, load_case, load_sweep
 
 OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
 
@@ -19,7 +19,7 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """Validate a case or a sweep; estimate its cost and limits."""
-    if is_sweep(file):
+    if kind_of_file(file) == "sweep":
         sweep = load_sweep(file, overrides)
         from brakecli.front.tables import estimate_table
         from brakecli.runs.limits import free_bytes

@@ -9,7 +9,7 @@ from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError
 from brakecli.faces import as_argument
 from brakecli.files.os_signals import unwinding
-from brakecli.front.inputs import is_sweep
+from brakecli.front.inputs import COMMANDS, kind_of_file
 from brakecli.front.measured import Measured
 
 SOURCE = "Result of any kind; with --quantity a measured signal, as for classify."
@@ -39,7 +39,8 @@ def command(
     """Draw a result, or a measured signal (needs matplotlib)."""
     target = output or Path(f"{Path(result).stem}.png")
     if Path(result).suffix == ".toml":
-        remedy = f"run it first, with: brakecli {'sweep' if is_sweep(result) else 'run'} {as_argument(result)}"
+        computes = COMMANDS.get(kind_of_file(result), "run")
+        remedy = f"run it first, with: brakecli {computes} {as_argument(result)}"
         raise UsageError(f"{result}: is no result yet; {remedy}")
     if measured.quantity_of(result) is not None:
         if select or variable or section:

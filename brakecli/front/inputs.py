@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from brakecli.sweeps.plan import LoadedSweep
 
 _Loaded = TypeVar("_Loaded")
+COMMANDS = {"sweep": "sweep", "study": "scatter"}
+"""What computes a file that is no case."""
 
 
 def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
@@ -29,14 +31,9 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
         try:
             return parse_case(*text, overrides or ())
         except CaseError as error:
-            if is_sweep(source):
-                remedy = f"compute it with: {command('sweep', source)}"
-                raise UsageError(f"{text[1]}: this is a sweep; {remedy}") from error
-            from brakecli.sweeps.plan import kind_of
-
-            if kind_of(text[0]) == "study":
-                remedy = f"compute it with: {command('scatter', source)}"
-                raise UsageError(f"{text[1]}: this is a study; {remedy}") from error
+            if (kind := kind_of_file(source)) in COMMANDS:
+                remedy = f"compute it with: {command(COMMANDS[kind], source)}"
+                raise UsageError(f"{text[1]}: this is a {kind}; {remedy}") from error
             raise
     from brakecli.files.read import open_result
 
@@ -85,11 +82,11 @@ def _over_a_case(
         raise
 
 
-def is_sweep(source: str) -> bool:
-    """Whether a file is meant to be a sweep."""
+def kind_of_file(source: str) -> str:
+    """What a file is meant to be: "case", "sweep", "study", or none of them, as a result."""
     from brakecli.sweeps.plan import kind_of
 
-    return not is_result(source) and kind_of(_text(source)[0]) == "sweep"
+    return "" if is_result(source) else kind_of(_text(source)[0])
 
 
 def _text(source: str) -> tuple[str, str]:

@@ -16,7 +16,7 @@ from brakecli.analysis.probability import Probability
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
 from brakecli.case.tables import json_schema
-from brakecli.errors import BrakecliError, CaseError
+from brakecli.errors import BrakecliError, CaseError, UsageError
 from brakecli.files.read import open_result
 from brakecli.front.inputs import load_case, load_study
 from brakecli.scattering.answers import Indices, quantiles
@@ -296,6 +296,24 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
     shown = command("advise", "shoe.toml", "--scatter", "study.toml", cwd=tmp_path).out
     assert "squeal under scatter" in shown
     assert "in place of" in shown
+
+
+def test_a_study_and_its_result_are_loaded_in_python(tmp_path: Path) -> None:
+    path = write_study(tmp_path, FRICTION, "samples = 16")
+    study = brakecli.load(path, {"link2.angle_deg": 6.0})
+    report = brakecli.scatter(study, output=tmp_path / "r.h5")
+    assert report.identical(brakecli.scatter(path, {"link2.angle_deg": 6.0}))
+    stored = brakecli.load(tmp_path / "r.h5")
+    assert stored.to_dataset().identical(report)
+    assert str(report.attrs["sentence"])[:20] in stored.brakecli.table()
+    one, other = (
+        brakecli.advise(tmp_path / "shoe.toml", keys="shoe.mass", scatter=each) for each in (study, path)
+    )
+    assert one.advice == other.advice
+    assert one.squeal == other.squeal
+    with pytest.raises(UsageError, match="come too late for a study that was loaded"):
+        brakecli.scatter(study, {"samples": 32})
+    command("plot", "study.toml", cwd=tmp_path).told(2, "brakecli scatter study.toml")
 
 
 def test_a_drawing_beside_all_samples_is_named(tmp_path: Path) -> None:
