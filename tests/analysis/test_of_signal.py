@@ -27,8 +27,14 @@ IN_DOUBT = {  # at 20 dB and worse
 }
 
 
-@pytest.mark.parametrize("per_cycle", [10, 50, *(pytest.param(n, marks=campaign) for n in (20, 200, 1000))])
-@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.FORCE])
+@pytest.mark.parametrize(
+    ("per_cycle", "quantity"),
+    [
+        pytest.param(n, quantity, marks=() if (n, k) in ((10, 0), (50, 1), (10, 2)) else campaign)
+        for n in (10, 20, 50, 200, 1000)
+        for k, quantity in enumerate((Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.FORCE))
+    ],
+)
 def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) -> None:
     checked = 0
     for motion in motions(per_cycle, 100):
@@ -42,8 +48,14 @@ def test_no_motion_is_mistaken_for_another(per_cycle: int, quantity: Measurand) 
     assert checked == 69
 
 
-@pytest.mark.parametrize("kind", ["spikes", "drift", "offset", "sign reversed", "short gaps", "long gap"])
-@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY])
+@pytest.mark.parametrize(
+    ("kind", "quantity"),
+    [
+        pytest.param(kind, quantity, marks=campaign if (k + n) % 2 else ())
+        for k, kind in enumerate(("spikes", "drift", "offset", "sign reversed", "short gaps", "long gap"))
+        for n, quantity in enumerate((Measurand.DISPLACEMENT, Measurand.VELOCITY))
+    ],
+)
 def test_disturbances_do_not_change_the_regime(kind: str, quantity: Measurand) -> None:
     checked = 0
     for motion in motions(50, 100):

@@ -38,6 +38,7 @@ def test_the_surroundings_change_no_bit(good: Path, here: Path) -> None:
         assert (here / f"{n}.h5").read_bytes() == (good / "tiny.h5").read_bytes()
 
 
+@campaign
 def test_without_a_place_for_compiled_code_everything_works_but_slower(here: Path) -> None:
     done = brakecli("check", "tiny.toml", "--json", cwd=here, XDG_CACHE_HOME="/proc/nowhere")
     told = done.told(0, "warning: the cache of compiled kernels cannot be used: ", "XDG_CACHE_HOME")
@@ -46,6 +47,7 @@ def test_without_a_place_for_compiled_code_everything_works_but_slower(here: Pat
     assert done.json["steps"] == 2000
 
 
+@campaign
 def test_a_command_says_that_it_compiles_when_it_does_and_only_then(good: Path, here: Path) -> None:
     def told(*arguments: str | Path) -> str:
         return brakecli(*arguments, cwd=here, XDG_CACHE_HOME=str(here / "cache")).told(0)

@@ -158,7 +158,7 @@ def test_envelope_is_the_least_and_greatest_value_of_each_column(
     assert max(asked) <= 333
 
 
-@pytest.mark.parametrize("samples", [1, 3, *(pytest.param(n, marks=campaign) for n in (2, 160))])
+@pytest.mark.parametrize("samples", [1, *(pytest.param(n, marks=campaign) for n in (2, 3, 160))])
 def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None:
     still = {"x": np.zeros(samples), "vx": np.zeros(samples), "state": np.full(samples, 2)}
     for number, moved in enumerate((still, sine(samples))):
@@ -171,7 +171,7 @@ def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None
         assert picture.summary == "failed at t = 0 s: it broke"
 
 
-@pytest.mark.parametrize("scale", [0.0, 1e-300, 1e149, *(pytest.param(s, marks=campaign) for s in (1e-12, 1e9))])
+@pytest.mark.parametrize("scale", [1e-300, 1e149, *(pytest.param(s, marks=campaign) for s in (0.0, 1e-12, 1e9))])
 def test_motions_of_any_size_are_drawn(scale: float, tmp_path: Path) -> None:
     moved = {"x": scale * sine(500)["x"], "vx": scale * sine(500)["vx"], "state": np.full(500, 1)}
     plot_result(write(tmp_path / "r.h5", moved), tmp_path / "r.png", force=False)

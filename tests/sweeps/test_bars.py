@@ -31,7 +31,7 @@ SEEDS = {  # shoes with a critical value in their range
     "smooth": [1, 2, 5, 10, 16, 20, 27, 32],
     "soft": [6, 8, 9, 10, 13, 21, 26, 29, 42, 56],
 }
-FEW = [("smooth", 10), ("smooth", 27), ("soft", 13), ("soft", 42)]
+FEW = [("smooth", 10), ("smooth", 27), ("soft", 42)]
 INDEPENDENT = 3e-5  # of the range: what three times as many cells and steps of the other integrator move
 WAY = 12  # values on the way to the bar, along which the forced motion is followed
 WITHIN = (-0.5, -0.25, -0.1, -0.03, -0.01, 0.01, 0.03, 0.1, 0.25, 0.5, 1.0)  # of a bar that holds several windows
@@ -123,7 +123,9 @@ BETWEEN: Tables = {  # stable for half a per cent of the range
 }
 
 
-@pytest.mark.parametrize(("tables", "upper", "windows"), [(DAMPING, 4.0, 1), (BETWEEN, 5.8, 2)])
+@pytest.mark.parametrize(
+    ("tables", "upper", "windows"), [pytest.param(DAMPING, 4.0, 1, marks=campaign), (BETWEEN, 5.8, 2)]
+)
 def test_the_truth_lies_within_the_error_bars_of_all_windows(tables: Tables, upper: float, windows: int) -> None:
     key, critical = (
         "friction__coefficient",

@@ -112,7 +112,7 @@ def test_a_cluster_gives_the_bytes_of_a_sweep_at_home(cluster: Cluster, good: Pa
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
 
 
-@pytest.mark.parametrize("method", ["eigenvalue", "run"])
+@pytest.mark.parametrize("method", ["eigenvalue", pytest.param("run", marks=campaign)])
 def test_so_does_a_study_of_scatter(cluster: Cluster, tmp_path: Path, method: str) -> None:
     (tmp_path / "case.toml").write_text(TINY)
     scatters = '[[parameter]]\nkey = "friction.coefficient"\ndistribution = "uniform"\nlow = 0.1\nhigh = 0.9\n'

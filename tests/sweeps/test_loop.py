@@ -81,7 +81,8 @@ def _lasts(regime: bytes | str) -> bool:
     return (regime.decode() if isinstance(regime, bytes) else regime) in ("relaxation", "quasi-harmonic")
 
 
-@pytest.mark.parametrize("number", [WIDE, *(pytest.param(each, marks=campaign) for each in OTHERS)])
+@campaign
+@pytest.mark.parametrize("number", [WIDE, *OTHERS])
 def test_the_loop_opens_at_the_critical_value_and_closes_at_the_fold(tmp_path: Path, number: int) -> None:
     """On the way up the step of the axis is the disturbance. It is below the barrier, but for the last one."""
     shoe = Followed(tmp_path, number)

@@ -99,6 +99,7 @@ def test_a_note_says_where_no_motion_was_found(tmp_path: Path) -> None:
     assert any("a window of instability ends anywhere from" in each for each in printed["findings"])
 
 
+@campaign
 def test_where_no_motion_was_found_a_window_ends_anywhere() -> None:
     """Growth of up to 557 1/s lasts to the end of the range."""
     found = answer(LOST, 4.9)

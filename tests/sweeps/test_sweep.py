@@ -110,16 +110,11 @@ def test_an_axis_of_texts_and_a_search_without_axes_have_their_dimension(tmp_pat
 
 
 def test_a_search_says_what_it_does_not_find_without_dashpots(tmp_path: Path) -> None:
-    (tmp_path / "s.toml").write_text(
-        'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
-    )
+    text = 'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
     rough = CASE + "\n[roughness.wheel]\namplitudes = [1e-9]\nwavelengths = [0.02]\n"
-    for text, bare, warned in ((rough, True, True), (rough, False, False), (CASE, True, False)):
-        (tmp_path / "tiny.toml").write_text(text)
-        settings = ["--set", "link1.damping=0", "--set", "link2.damping=0"] if bare else []
-        told = brakecli("sweep", "s.toml", "-j", "1", "--json", "--force", *settings, cwd=tmp_path).json[
-            "findings"
-        ]
+    for case, bare, warned in ((rough, True, True), (rough, False, False), (CASE, True, False)):
+        loaded = load(tmp_path, text, case, *(["link1.damping=0", "link2.damping=0"] if bare else []))
+        told = inline(loaded, tmp_path / "s.h5", compute_units, force=True).findings.sentences
         assert any("no dashpot acts: growth that a damping ratio of 1e-05" in each for each in told) is warned
 
 
