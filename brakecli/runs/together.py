@@ -35,13 +35,12 @@ def _runs(system: System) -> Generator[System, Motion, Certified]:
     """What is run in lanes for a promise."""
     fastest, waves = 2.0 * math.pi * system.natural_frequencies[1], FIRST_PER_WAVE * system.passing_frequency
     turn = FIRST_TURN * (system.method.tolerance / 1e-3) ** (1.0 / ORDER)
-    method = replace(system.method, scheme="three-layer", theta=NUMEROV)
-    begin = replace(system, method=method, start_error=displacement(system))
-    nodes = 2 * first_nodes(begin)
+    nodes, start_error = 2 * first_nodes(system), displacement(system)
 
     def rung(per_sample: float, more: float) -> System:
-        step = system.interval / _few(per_sample)
-        return replace(begin, method=replace(method, step=step, nodes=int(nodes * _few(more))))
+        step, more_nodes = system.interval / _few(per_sample), int(nodes * _few(more))
+        method = replace(system.method, scheme="three-layer", theta=NUMEROV, step=step, nodes=more_nodes)
+        return replace(system, method=method, start_error=start_error)
 
     def finer(run: System, steps: float, by_nodes: float) -> System | None:
         shorter, more = steps ** (1.0 / ORDER), by_nodes**0.5

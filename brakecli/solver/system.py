@@ -157,7 +157,7 @@ class System:
     @property
     def fastest_belt(self) -> float:
         """The largest |U|, m/s."""
-        return float(np.abs(self.belt["value"]).max())
+        return float(max(map(abs, self.belt["value"].tolist())))
 
     @property
     def load_at_start(self) -> float:
@@ -167,12 +167,12 @@ class System:
     @property
     def passing_frequency(self) -> float:
         """Passing frequency of the shortest wave of the wheel at its largest speed, Hz."""
-        return self.fastest_belt * float(max(self.wheel.turns, default=0.0))
+        return self.fastest_belt * max(self.wheel.turns.tolist(), default=0.0)
 
     @property
     def most_turns(self) -> float:
         """Waves per metre of the shortest wave of both surfaces, 1/m; 0 where they are smooth."""
-        return max([*self.shoe.turns, *self.wheel.turns], default=0.0)
+        return max([*self.shoe.turns.tolist(), *self.wheel.turns.tolist()], default=0.0)
 
     def refuse_steps(self, held: float) -> None:
         """Raise RefusedError where a run would not end, or hold samples of too many bytes in memory."""

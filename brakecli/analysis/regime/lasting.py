@@ -144,15 +144,19 @@ def _gone(shown: Shown, decay: float, own: Array, forced: float) -> tuple[int, f
     Also what is left in the last quarter, and whether it stays: then it is forced, and missing in the closed form.
     """
     starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
-    left = 0.5 * (np.maximum.reduceat(own, starts) - np.minimum.reduceat(own, starts))
-    end = 0.5 * float(np.ptp(own[starts[-10] :]))  # a window may be shorter than a period
+    high, low = np.maximum.reduceat(own, starts), np.minimum.reduceat(own, starts)
+    left, end = (
+        0.5 * (high - low),
+        0.5 * float(high[-10:].max() - low[-10:].min()),
+    )  # a window may be shorter than a period
     change = trend(np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
     lost = 0.5 * decay * shown.duration
     stays = 0.5 * lost > _RELAXED and change > -0.25 * lost
     level = shown.limits.settled_within * forced
     if end < _REST * forced and stays:
         level = max(level, 1.2 * end)
-    return int(np.flatnonzero(np.append(True, left[1:] > level))[-1]) + 1, level, end, stays
+    late = np.flatnonzero(left > level)
+    return int(late[-1]) + 1 if len(late) else 1, level, end, stays
 
 
 def _forced(shown: Shown, answers: Answers) -> Lasting:

@@ -81,15 +81,13 @@ class Linear:
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
-        turns, speeds = _turns(tuple(self.passing.tolist()), time.tobytes()), 2.0 * math.pi * self.passing
-        position, velocity = self.waves.T, 1j * speeds * self.waves.T
-        found = [np.concatenate([each.real, each.imag], axis=1) @ turns for each in (position, velocity)]
-        return found[0], found[1]
+        found = self._sums(time, *self.waves.T, *(2j * math.pi * self.passing * self.waves.T))
+        return found[:2], found[2:]
 
-    def _sum(self, waves: Complex, time: Array) -> Array:
-        """What has these amplitudes, with their phases at t = 0, at times (s)."""
-        turns = _turns(tuple(self.passing.tolist()), time.tobytes())
-        return np.asarray(np.concatenate([waves.real, waves.imag]) @ turns)
+    def _sums(self, time: Array, *waves: Complex) -> Array:
+        """What has these amplitudes, with their phases at t = 0, at times (s), in rows."""
+        turns, rows = _turns(tuple(self.passing.tolist()), time.tobytes()), np.array(waves)
+        return np.asarray(np.concatenate([rows.real, rows.imag], axis=1) @ turns)
 
     def _extremes(self, span: float) -> tuple[float, float]:
         """Largest and least x (m) that the waves force within a time (s).
@@ -111,16 +109,16 @@ class Linear:
 
         Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
         """
-        lasting = self._sum(self.waves[:, 0], time)
+        (lasting,) = self._sums(time, self.waves[:, 0])
         high, low = self._extremes(_BEYOND * time[-1]) if len(self.waves) > 1 and self.belt else (0.0, 0.0)
         size = 0.5 * (max(float(lasting.max()), high) - min(float(lasting.min()), low))
         return size, lasting, x - self.rest[0] - lasting, time
 
     def force_parts(self, y: Array, time: Array) -> tuple[float, Array]:
         """Half of peak to peak of the normal force (N) that the waves force; what the shoe adds at the times."""
-        stiffness, lasting = self.force / self.depth, self.waves[:, 1]
-        forced = self._sum(self.slopes / self.wavenumbers - stiffness * lasting, time)
-        return 0.5 * float(np.ptp(forced)), stiffness * (self.rest[1] + self._sum(lasting, time) - y)
+        stiffness, waves = self.force / self.depth, self.waves[:, 1]
+        forced, lasting = self._sums(time, self.slopes / self.wavenumbers - stiffness * waves, waves)
+        return 0.5 * float(np.ptp(forced)), stiffness * (self.rest[1] + lasting - y)
 
     def stays(self, state: Array) -> bool:
         """Whether a motion on a smooth wheel that decays can neither stick nor open any more.
