@@ -267,10 +267,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     found.frequency = cycles.frequency
     if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
         found.frequency, width = part.strongest
-        found.evidence |= {
-            "frequency_spread": width,
-            **in_lines(part, found.frequency),
-        }
+        found.evidence |= {"frequency_spread": width, **in_lines(part, found.frequency)}
     short = seconds < shown.slowest(0.0) or abs(answers.change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends
         found.spread = held(

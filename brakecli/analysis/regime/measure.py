@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from functools import cache, cached_property, lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -142,10 +142,9 @@ def answers(
     shown: Shown, exponent: Exponent | None, continued: Callable[[], Continued], failure: str = ""
 ) -> Answers:
     """The record of answers; `continued` is asked only where a row may need it."""
-    continued = cache(continued)
     context, history, half, last = shown.context, shown.history, shown.half, shown.last
     stands, waves = context.belt_speed == 0.0, bool(context.forced)
-    away, stick = ContactState.SEPARATED, ContactState.STICK
+    away = ContactState.SEPARATED
     lost = half.always(away)
     found: dict[str, Any] = {
         "failure": failure or "",
@@ -162,7 +161,7 @@ def answers(
         "never": lost and shown.whole.always(away),
         "lost": lost,
         "left": last.always(away),
-        "carried": (last if stands else half).always(stick),
+        "carried": (last if stands else half).always(ContactState.STICK),
     }
     if exponent is not None:
         found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))

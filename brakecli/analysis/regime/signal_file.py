@@ -62,20 +62,16 @@ def read_signal(
     Units come from the file and from `unit` and `time_unit`. Raises UnreadableResultError and UsageError.
     """
     if sample_rate is not None and not 1.0 / _FARTHEST <= sample_rate <= 1.0 / _NEAREST:
-        raise UsageError(
-            f"{argument('sample-rate')} {sample_rate}: is not a number above 0 Hz (1e-12 to 1e12); "
-            "give samples per second"
-        )
+        what = "is not a number above 0 Hz (1e-12 to 1e12); give samples per second"
+        raise UsageError(f"{argument('sample-rate')} {sample_rate}: {what}")
     path, inside = Path(source), None
     there = os.path.exists(path)  # noqa: PTH110 - pathlib's may raise
     if not there and (found := re.fullmatch(r"(.+?):(/.*)", source)):
         path, inside = Path(found[1]), found[2]
     try:
         if time_unit is not None and time_column is None:
-            raise UsageError(
-                f"{argument('time-unit')}: is for a column of times; "
-                f"leave it out, or name one with {argument('time-column')}"
-            )
+            remedy = f"leave it out, or name one with {argument('time-column')}"
+            raise UsageError(f"{argument('time-unit')}: is for a column of times; {remedy}")
         times, name, wanted = [], "", _SI[quantity]
         if path.suffix.lower() in (".wav", ".wave") and inside is None:
             if time_column is not None:
@@ -84,10 +80,8 @@ def read_signal(
             size = _size(None, unit, *wanted)
         elif (sample_rate is None) == (time_column is None):
             given = "are not given" if time_column is None else "are given twice"
-            raise UsageError(
-                f"the times of the samples {given}; "
-                f"give {argument('sample-rate')} HZ or {argument('time-column')} NAME"
-            )
+            remedy = f"give {argument('sample-rate')} HZ or {argument('time-column')} NAME"
+            raise UsageError(f"the times of the samples {given}; {remedy}")
         elif inside is None:
             table = TextTable(path, "a CSV file, or FILE.h5:/path of an HDF5 file")
             values, *times = table.columns_of(column, time_column)
@@ -96,9 +90,8 @@ def read_signal(
             times = [time * _size(table.unit(clock[0], "second"), time_unit, "second") for time in times]
             name = table.names[place] if table.names else ""
         elif column is not None or time_column is not None:
-            raise UsageError(
-                f"a dataset has no columns; leave out {argument('column')}, and give {argument('sample-rate')} HZ"
-            )
+            remedy = f"leave out {argument('column')}, and give {argument('sample-rate')} HZ"
+            raise UsageError(f"a dataset has no columns; {remedy}")
         else:
             values, written = _dataset(path, name := inside)
             size = _size(_written(written, unit, quantity), unit, *wanted)
@@ -118,7 +111,7 @@ def read_signal(
 
 def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> float:
     """Size of the unit that the file or an option gives; raises UsageError where they contradict each other."""
-    name = f"--{'time-' if 'second' in wanted else ''}unit {printable(option or '')}"
+    name = f"{argument('time-unit' if 'second' in wanted else 'unit')} {printable(option or '')}"
     if option is not None:
         given = (1.0, "") if option == "1" else si(option)
         if given is None:
