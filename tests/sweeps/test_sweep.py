@@ -11,6 +11,7 @@ import xarray as xr
 from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
+from brakecli.errors import key_text
 from brakecli.sweeps.driver import TaskQueue
 from brakecli.sweeps.plan import LoadedSweep, Plan, parse_sweep, plan_of
 from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
@@ -47,6 +48,21 @@ def run(folder: Path, text: str, case: str = CASE, **options: Any) -> SweepRepor
 def opened(path: Path) -> xr.Dataset:
     with xr.open_dataset(path, engine="h5netcdf") as dataset:
         return dataset.load()
+
+
+def test_a_point_is_the_case_with_its_values(tmp_path: Path) -> None:
+    """Also where a table that no point changes follows from others: orders from the radius, samples from modes."""
+    text = TINY.replace("step = 1e-5", "tolerance = 1e-3").replace("output.sample_interval = 1e-4", "")
+    text += "[roughness.wheel]\namplitudes = [1e-6]\norders = [40]\n"
+    axes = (("wheel.radius", "[0.4, 0.6]"), ("link2.stiffness", "[1e7, 3e8]"))
+    tables = [f'[[axis]]\nparameter = "{key}"\nvalues = {values}\n' for key, values in axes]
+    plan, intervals = load(tmp_path, 'case = "tiny.toml"\n' + "".join(tables), text).plan, set()
+    for point in range(plan.points):
+        settings = plan.settings(point)
+        alone = parse_case(text, "c", [f"{key_text(path)}={value}" for path, value in settings.items()]).case
+        assert plan.case(settings) == alone
+        intervals.add(alone.output.sample_interval)
+    assert len(intervals) > 1
 
 
 def test_every_point_is_what_a_run_of_its_own_gives(tmp_path: Path) -> None:
