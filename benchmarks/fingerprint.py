@@ -28,19 +28,10 @@ Call: TypeAlias = tuple[str, tuple[str, ...]]
 Values: TypeAlias = dict[str, Any]
 
 ROOT = Path(__file__).parents[1]
-TIMED = (
-    "seconds",
-    "version",
-    "created",
-    "wall",
-    "per_second",
-    "on_front",
-    "recommended",
-    "margin",
-    "repeats",
-    "left_out",
-)
+TIMED = ("seconds", "version", "created", "wall", "per_second", "overhead")
 """Parts of names whose values depend on the clock or the version."""
+CHOSEN = ("on_front", "recommended", "margin", "repeats", "left_out")
+"""Of a comparison: those that depend on measured times."""
 GRID = """case = "relaxation.toml"
 [[axis]]
 parameter = "friction.coefficient"
@@ -298,7 +289,7 @@ def compare(before: dict[str, Values], after: dict[str, Values]) -> int:
     for name in before | after:
         old, new = before.get(name, {}), after.get(name, {})
         for key in old | new:
-            if any(part in key for part in TIMED):
+            if any(part in key for part in (*TIMED, *CHOSEN * (name == "compare"))):
                 continue
             how = difference(old[key], new[key]) if key in old and key in new else "gone" if key in old else "new"
             if how:
