@@ -286,7 +286,7 @@ def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: P
     with new_result(tmp_path / "modes.h5", force=False) as result:
         result.set_attributes({"kind": "stability"})
         result.commit()
-    with pytest.raises(UsageError, match="for runs and sweeps"):
+    with pytest.raises(UsageError, match="for runs, sweeps and branches"):
         plot_result(tmp_path / "modes.h5", tmp_path / "r.png", force=False, variable="x")
 
 
