@@ -283,7 +283,10 @@ def test_the_starter_of_hysteresis_finds_the_loop_of_the_branch(tmp_path: Path) 
     up = f"begins on the way up between {values[last]:g} and {values[last + 1]:g}"
     down = f"ends on the way down between {values[first]:g} and {values[first - 1]:g}"
     where = f"along friction.coefficient the vibration {up}, and {down}"
-    assert report.findings.sentences == [f"hysteresis at {sum(loop)} of 6 points: {where}"]
+    ran = (report.findings.variables or {})["duration"]
+    ends = f"{np.min(ran):.4g} to {np.max(ran):.4g} s"
+    settled_ = f"all 12 points have settled, in {ends}"
+    assert report.findings.sentences == [f"hysteresis at {sum(loop)} of 6 points: {where}", settled_]
 
 
 def test_amplitudes_that_are_still_on_their_way_are_no_hysteresis(tmp_path: Path) -> None:
