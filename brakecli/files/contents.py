@@ -158,11 +158,11 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
         shapes = [list(each[name].shape) if name in each else [] for each in known]
         compared = different = 0
         largest = highest = 0.0
-        numeric, along = True, None
+        coded, numeric, along = any("flag_meanings" in each.attributes for each in held), True, None
         if all(shapes) and shapes[0][1:] == shapes[1][1:]:
             along = _other_places(a, b, group, held)
             for one, other in (_pairs if along is None else _interpolated)(a, b, group, name, along or ""):
-                numeric = one.dtype.kind in "iuf" and other.dtype.kind in "iuf"
+                numeric = not coded and one.dtype.kind in "iuf" and other.dtype.kind in "iuf"
                 apart = one != other
                 if numeric:
                     there = (one != FILL) & (other != FILL)

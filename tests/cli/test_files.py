@@ -13,10 +13,12 @@ import numpy as np
 import pytest
 
 from brakecli.about import __version__
+from brakecli.case.read import parse_case
 from brakecli.files import fields
 from brakecli.files.contents import difference
 from brakecli.files.read import open_result
 from brakecli.plots import two
+from brakecli.runs.run import run
 from tests.commands import TINY, attributes, brakecli, each, left_in
 from tests.sweeps.made_up import CYCLE, DAMPED, swept
 
@@ -321,6 +323,16 @@ def test_a_sentence_says_what_differs_in_lines_of_eighty_columns(folder: Path) -
     assert head.startswith(f"the case differs in friction.coefficient; the verdict {same}; {most[1]} differs most")
     assert f"{most[2]:.3g}" in head
     assert f"{most[0]:.3g} times its largest value" in head
+
+
+def test_states_are_counted_and_have_no_size(tmp_path: Path) -> None:
+    """A shoe that sticks and one that slides: their codes have no size."""
+    for name, friction in (("a.h5", 0.9), ("b.h5", 0.1)):
+        run(parse_case(TINY, "tiny", [f"friction.coefficient={friction}"]), tmp_path / name, force=False)
+    with open_result(tmp_path / "a.h5") as a, open_result(tmp_path / "b.h5") as b:
+        found = {each["name"]: each for each in difference(a, b).variables}
+    assert found["state"]["different"] > 0
+    assert found["state"]["largest"] is found["state"]["relative"] is None
 
 
 def test_a_sentence_counts_the_points_of_sweeps_with_another_verdict(tmp_path: Path) -> None:
