@@ -84,7 +84,7 @@ REASONS = {
         " One in a hundred, beside the critical friction, runs to its end: thirty times as long."
     ),
     "map on B": (
-        "The map on B: a point takes some 1.1 ms of a core. Its promise takes 3,200 steps in a lane, 0.3 ms, two"
+        "The map on B: a point takes some 1.4 ms of a core. Its promise takes 3,200 steps in a lane, 0.3 ms, two"
         " thirds of it for the nodes of pads that open. The verdict takes 0.4 ms: 0.06 to find where waves meet,"
         " the rest for levels, windows and words; linear theory is computed for 64 points at once, in 0.04. Case,"
         " check and record take 0.2 ms, one point at a time in Python. A worker takes 0.8 s to start, nearly all"
