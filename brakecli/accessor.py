@@ -22,10 +22,11 @@ from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.as_xarray import stored
 from brakecli.files.contents import Difference
-from brakecli.files.field import Field, values_of
+from brakecli.files.field import values_of
 from brakecli.front.file_tables import diff_table
+from brakecli.front.render import TERMINAL
 from brakecli.front.stability_tables import advice_table
-from brakecli.front.tables import Row, text_of, two_columns, verdict_table
+from brakecli.front.tables import Row, two_columns, verdict_table
 from brakecli.runs.advise import AdviceReport
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.sweeps.attractors import Attractor
@@ -166,7 +167,7 @@ class Accessor(Shown):
             missing = dict.fromkeys(each.name for each in fields.VERDICT)
             return verdict_table(title, {**missing, **held, **lists, "reasons": self.reasons, "evidence": {}})
         told = [each for name, each in _TOLD.items() if name in held]
-        rows: list[Row] = [(each.title, _cell(held[each.name], each)) for each in told]
+        rows: list[Row] = [(each.title, TERMINAL.field(each, held[each.name])) for each in told]
         regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist() if "regime" in self._found else ())
         rows += [(name, f"at {count} of {regimes.total()}") for name, count in regimes.most_common()]
         rows += [
@@ -204,12 +205,3 @@ def _known(value: Any) -> Any:
     """A value without NumPy; None where there is none."""
     value = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return None if value != value or value == "" else value  # NaN
-
-
-def _cell(value: Any, field: Field) -> str:
-    """A value, or values, with their unit."""
-    if isinstance(value, list):
-        return ", ".join(_cell(each, field) for each in value) or "-"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    return text_of(value, field.units if field.units not in ("1", "of the key") else "")

@@ -29,6 +29,16 @@ class Field:
         """The words for the terminal."""
         return self.label or self.name.replace("_", " ")
 
+    @property
+    def is_flag(self) -> bool:
+        """Whether its number means yes or no."""
+        return "(0, 1)" in self.meaning
+
+    @property
+    def is_part_of_time(self) -> bool:
+        """Whether it is a part of the time, which people read in per cent."""
+        return self.meaning.startswith("part of the time")
+
     @cached_property
     def _path(self) -> list[str]:
         return (self.at + self.name if self.at[-1:] in ("", ".") else self.at).split(".")

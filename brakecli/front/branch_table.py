@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from brakecli.front.tables import grid, text_of, two_columns
+from brakecli.front.render import text_of
+from brakecli.front.tables import grid, two_columns
 
 if TYPE_CHECKING:
     from brakecli.branches.answers import Answers

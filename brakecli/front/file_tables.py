@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from brakecli.errors import value_text
-from brakecli.files.field import plain_units
-from brakecli.front.tables import grid, text_of, two_columns
+from brakecli.front.render import text_of
+from brakecli.front.tables import grid, two_columns
 
 _ASIDE = ("regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
 
@@ -69,9 +69,9 @@ def _prose(text: str) -> str:
 
 
 def _text(value: Any, units: str | None = None, form: str = ".6g") -> str:
-    if isinstance(value, float):
-        return text_of(value, "" if units in (None, "1") else plain_units(str(units)), form)
-    return "-" if value is None else value_text(value).strip('"')
+    if isinstance(value, float) or value is None:
+        return text_of(value, units or "", form)
+    return value_text(value).strip('"')
 
 
 def _place(variable: Mapping[str, Any]) -> str:

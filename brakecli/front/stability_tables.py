@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 from brakecli.analysis.stability.advice import rounded
 from brakecli.files import fields
-from brakecli.front.tables import Row, grid, text_of, two_columns
+from brakecli.front.render import text_of
+from brakecli.front.tables import Row, grid, two_columns
 
 if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change

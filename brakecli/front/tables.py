@@ -10,6 +10,7 @@ import numpy as np
 from brakecli.errors import escaped
 from brakecli.files import fields
 from brakecli.files.field import Field, named, values_of
+from brakecli.front.render import TERMINAL, text_of
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.quantities import COEFFICIENTS
 
@@ -106,9 +107,7 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
         rows.append(("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json"))
     for name, value in numbers["evidence"].items():
         unit = si_unit if name == "noise" else fields.evidence_unit(name)
-        shown = ", ".join(f"{each:.4g}" for each in value) if isinstance(value, list | tuple) else f"{value}"
-        shown = f"{value:.6g}" if isinstance(value, float) else shown
-        rows.append((name.replace("_", " "), f"{shown} {unit}".rstrip() if shown else "-"))
+        rows.append((name.replace("_", " "), TERMINAL.text(value, unit)))
     return two_columns(source, rows)
 
 
@@ -286,23 +285,12 @@ def comparison_table(report: ComparisonReport) -> str:
 
 
 def _rows(known: Iterable[Field], numbers: Mapping[str, Any], *names: str) -> list[Row]:
-    """A row for each of these fields, with its declared label and unit; parts of one are percentages."""
-    rows: list[Row] = []
-    for each in named(known, *names):
-        shown = ("of the time", ".2%") if each.units == "1" else (each.units,)
-        rows.append((each.title, text_of(numbers[each.name], *shown)))
-    return rows
+    """A row for each of these fields, with its declared label and unit."""
+    return [(each.title, TERMINAL.field(each, numbers[each.name])) for each in named(known, *names)]
 
 
 def _entries(records: Collection[Mapping[str, Any]]) -> str:
     return grid({header: [text_of(each[name], form=form) for each in records] for name, header, form in ENTRIES})
-
-
-def text_of(value: str | float | None, unit: str = "", form: str = ".6g") -> str:
-    """A value with its unit; a dash stands for what does not exist."""
-    if value is None:
-        return "-"
-    return value if isinstance(value, str) else f"{value:{form}} {unit}".rstrip()
 
 
 def two_columns(title: str, rows: Sequence[Row]) -> str:

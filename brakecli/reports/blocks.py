@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from brakecli.files.field import Field
+from brakecli.front.render import Renderer
 from brakecli.plots import style
 from brakecli.sweeps.result import unit
 
-_MOST_VALUES = 8  # of a list that are written
 Numbers = Mapping[str, tuple[Any, str]]
 """What two results are compared by: values with their units, by their names."""
 
@@ -111,23 +111,16 @@ def picture(words: str, draw: Callable[[], Figure]) -> Picture:
     return Picture(words, images[0], images[1])
 
 
-def shown(value: Any, unit: str = "") -> str:
-    """A value as people write it, with its unit: a prefix where it needs one."""
-    unit = unit if unit != "1" else ""
-    if isinstance(value, str) or value is None:
-        return value or "–"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
+def _prefixed(value: Any, unit: str) -> str:
     if isinstance(value, int | np.integer) and not unit:
         return f"{int(value):,}".replace(",", "\u202f").replace("-", "−")
-    if isinstance(value, Mapping):
-        return ", ".join(f"{name} {shown(each)}" for name, each in value.items())
-    if hasattr(value, "__len__"):
-        more = f" … ({len(value)} values)" * (len(value) > _MOST_VALUES)
-        texts = [shown(each, unit) for each in value[:_MOST_VALUES]]
-        return (", ".join(texts) or "none") + more
     factor, unit = style.prefixed(abs(float(value)), unit)
     return f"{style.readable(factor * float(value))} {unit}".rstrip().replace(" ", "\u00a0")
+
+
+PAGE = Renderer(_prefixed, "–", most=8, each=True)
+"""A page writes a prefix where a number needs one."""
+shown = PAGE.text
 
 
 def percent(part: float) -> str:
@@ -150,14 +143,3 @@ def key_unit(key: str) -> str:
 def numbers_of(known: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
     """The values of some fields, None where there is none."""
     return {each.title: (values.get(each.name), each.units) for each in known}
-
-
-def rows_of(known: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str, str, str]]:
-    """A row for each field that has a value: its name, value and meaning."""
-    rows = []
-    for each in known:
-        if (value := values.get(each.name)) is not None:
-            value = bool(value) if "(0, 1)" in each.meaning else value
-            meaning = each.meaning.replace("`", "").replace(" (0, 1)", "")
-            rows.append((each.title, shown(value, each.units), meaning))
-    return rows

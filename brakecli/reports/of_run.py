@@ -24,7 +24,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
-from brakecli.reports.blocks import Code, Part, Section, Table, Texts, numbers_of, percent, picture, rows_of, shown
+from brakecli.reports.blocks import PAGE, Code, Part, Section, Table, Texts, numbers_of, percent, picture, shown
 from brakecli.runs.advise import AdviceReport, advise
 from brakecli.solver.motion import Counted
 from brakecli.sweeps.result import unit
@@ -217,7 +217,7 @@ def _diagram(advice: AdviceReport) -> Figure:
 
 def _regime(result: StoredResult) -> list[Any]:
     found = result.attributes
-    rows = rows_of((each for each in fields.VERDICT if each.kind != fields.OBJECT), found)
+    rows = PAGE.rows((each for each in fields.VERDICT if each.kind != fields.OBJECT), found)
     evidence = result.group_attributes("regime/evidence")
     proof = [
         (name.replace("_", " "), shown(value, fields.evidence_unit(name)))
@@ -241,7 +241,7 @@ def _vibrations(result: StoredResult) -> list[list[float]]:
 def _accuracy(result: StoredResult) -> list[Any]:
     error = abs(float(result.group_attributes("energy").get("relative_closing_error", math.nan)))
     closing = "energy account", f"{error:.1e}", "what it does not account for, over its largest item"
-    return [Table([*rows_of(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
+    return [Table([*PAGE.rows(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
 
 
 def _sentences(begin: str, lines: Iterable[str]) -> list[str]:

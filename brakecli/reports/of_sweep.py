@@ -22,6 +22,7 @@ from brakecli.plots.run import case_of
 from brakecli.plots.scatter import NAMES
 from brakecli.plots.sweep import SweepPicture
 from brakecli.reports.blocks import (
+    PAGE,
     Code,
     Numbers,
     Part,
@@ -33,7 +34,6 @@ from brakecli.reports.blocks import (
     numbers_of,
     picture,
     rounded,
-    rows_of,
     shown,
 )
 from brakecli.reports.of_run import case_blocks, repeat
@@ -147,7 +147,7 @@ def part_of_other(result: StoredResult) -> Part:
         for each in declared.get(kind, fields.COMPARISON)
         if each.name not in apart and each.in_file
     ]
-    tables, numbers = [Table(rows_of(known, result.attributes))], numbers_of(known, result.attributes)
+    tables, numbers = [Table(PAGE.rows(known, result.attributes))], numbers_of(known, result.attributes)
     drawn = picture(_PICTURES[kind], partial(draw, result))
     answer = ["No entry meets the wanted error."]
     if kind == "stability":
