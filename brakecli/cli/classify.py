@@ -6,7 +6,6 @@ from brakecli.cli.measured import UNMEASURED, with_measured
 from brakecli.cli.options import AsJson, ForceRead, Quiet, option, source_argument
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.faces import argument
 from brakecli.front.measured import Measured
 from brakecli.front.verdict import verdict_on
 
@@ -29,7 +28,7 @@ def command(
 ) -> None:
     """Regime of runs or of measured signals, with evidence."""
     if second_run:
-        raise UsageError(f"{argument('second-run')}: {_NO_SECOND}")
+        raise UsageError(f"--second-run: {_NO_SECOND}")
     if len(sources) == 1:
         from brakecli.front.tables import verdict_table
 

@@ -145,10 +145,8 @@ def _gone(shown: Shown, decay: float, own: Array, forced: float) -> tuple[int, f
     """
     starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
     high, low = np.maximum.reduceat(own, starts), np.minimum.reduceat(own, starts)
-    left, end = (
-        0.5 * (high - low),
-        0.5 * float(high[-10:].max() - low[-10:].min()),
-    )  # a window may be shorter than a period
+    left = 0.5 * (high - low)
+    end = 0.5 * float(high[-10:].max() - low[-10:].min())  # a window may be shorter than a period
     change = trend(np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
     lost = 0.5 * decay * shown.duration
     stays = 0.5 * lost > _RELAXED and change > -0.25 * lost
