@@ -77,7 +77,8 @@ class Difference:
         if self.same:
             return "no difference in case, numbers and variables"
         names = [str(each["name"]) for each in self.case]
-        more = f" and {len(names) - _NAMED} more keys" if len(names) > _NAMED else ""
+        rest = len(names) - _NAMED
+        more = f" and {rest} more key{'s' * (rest > 1)}" if rest > 0 else ""
         said = [f"the case differs in {', '.join(names[:_NAMED])}{more}" if names else "the case is the same"]
         if self.judged:
             pairs = [each for each in self.numbers if each["name"] == "regime"]

@@ -15,7 +15,7 @@ import pytest
 from brakecli.about import __version__
 from brakecli.case.read import parse_case
 from brakecli.files import fields
-from brakecli.files.contents import difference
+from brakecli.files.contents import Difference, difference
 from brakecli.files.read import open_result
 from brakecli.plots import two
 from brakecli.runs.run import run
@@ -323,6 +323,20 @@ def test_a_sentence_says_what_differs_in_lines_of_eighty_columns(folder: Path) -
     assert head.startswith(f"the case differs in friction.coefficient; the verdict {same}; {most[1]} differs most")
     assert f"{most[2]:.3g}" in head
     assert f"{most[0]:.3g} times its largest value" in head
+
+
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [
+        (1, "in k0"),
+        (3, "in k0, k1, k2"),
+        (4, "in k0, k1, k2 and 1 more key"),
+        (5, "in k0, k1, k2 and 2 more keys"),
+    ],
+)
+def test_a_sentence_names_three_keys_and_counts_the_others(count: int, words: str) -> None:
+    case = [{"name": f"k{number}", "a": 1, "b": 2} for number in range(count)]
+    assert Difference(case, [], [], [], judged=False).sentence == f"the case differs {words}"
 
 
 def test_states_are_counted_and_have_no_size(tmp_path: Path) -> None:
