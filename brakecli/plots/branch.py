@@ -106,11 +106,16 @@ def _other_mode(frequency: style.Array, multipliers: style.Array) -> style.Array
     """The places of steady sliding at which another mode is the least stable one than at the place before.
 
     Multipliers are those of a period of the least stable mode, so that their angles say how far the other one is.
+    Modes change places only where they are equally stable: between both places the gap of their moduli closes, as
+    fast as it changes beside them. After flutter it stays open, and their frequencies are nearly the same.
     """
     angles = np.abs(np.arctan2(multipliers[..., 1], multipliers[..., 0])).max(axis=1) / (2.0 * np.pi)
     before, after, apart = frequency[:-1], frequency[1:], (angles * frequency)[:-1]
     other = np.minimum(np.abs(after - before - apart), np.abs(after - before + apart))
-    return 1 + np.flatnonzero(other < np.abs(after - before))
+    gap = np.ptp(np.hypot(multipliers[..., 0], multipliers[..., 1]), axis=1)
+    beside = np.pad(np.abs(np.diff(gap)), 1)
+    closes = gap[:-1] + gap[1:] <= 2.0 * np.maximum(beside[:-2], beside[2:]) + 1e-9  # rounding
+    return 1 + np.flatnonzero(closes & (other < np.abs(after - before)))
 
 
 def _with_ends(columns: dict[str, Any], marks: dict[str, Any]) -> dict[str, Any]:

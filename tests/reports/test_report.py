@@ -321,6 +321,15 @@ def test_a_curve_of_frequency_ends_where_another_mode_is_the_least_stable_one() 
     assert _other_mode(both[:, 0], parts).tolist() == []
 
 
+def test_a_curve_of_frequency_goes_on_after_flutter_where_both_modes_nearly_have_it() -> None:
+    """Frequencies meet and part by less than they drift; one mode grows, the other one decays."""
+    least = 174.4 + 0.012 * np.arange(9.0)
+    both = np.stack([least, least + 0.01 * (np.arange(9.0) - 4.0)], axis=1)
+    sizes = np.exp(np.stack([0.18 + 0.007 * np.arange(9.0), -0.35 - 0.007 * np.arange(9.0)], axis=1))
+    factors = np.tile(sizes, 2) * np.exp(2j * np.pi * np.concatenate([both, -both], axis=1) / least[:, None])
+    assert _other_mode(least, np.stack([factors.real, factors.imag], axis=-1)).tolist() == []
+
+
 def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) -> None:
     with new_result(tmp_path / "r.h5", force=False) as result:
         known = [Field(name, "1", name) for name in ("parameter", "total")]
