@@ -23,6 +23,7 @@ import numpy as np
 from numba import boolean, float64, int64, njit, types
 from numba.core import caching as numba_caching
 from numba.core import cgutils
+from numba.core import codegen as numba_codegen
 from numba.core import config as numba_config
 from numba.core import event as numba_events
 from numba.core.registry import CPUDispatcher
@@ -39,6 +40,7 @@ FAST = frozenset({"reassoc", "contract", "nsz"})
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 caching: Any = numba_caching  # has no types
+codegen: Any = numba_codegen  # has no types
 events: Any = numba_events  # has no types
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -198,15 +200,31 @@ def _not_compiled(function: Any, options: dict[str, Any]) -> Any:
     return njit(**options)(function)
 
 
+class _Whole(codegen.JITCodeLibrary):  # type: ignore[misc]
+    """The machine code of a kernel with a copy of its own of each kernel that it calls.
+
+    Numba lets a process use the first copy that it comes by: one that has just compiled a helper alone would take
+    that, and one that loads the caller the caller's, where a sum may have another order.
+    """
+
+    def _optimize_final_module(self) -> None:
+        for function in self._final_module.functions:
+            if function.linkage == codegen.ll.Linkage.linkonce_odr:  # what kernels become that another one calls
+                function.linkage = codegen.ll.Linkage.internal
+        super()._optimize_final_module()
+
+
 def _compile(dispatcher: Any, signature: Any) -> None:
     """Compile a kernel for one signature, or load it from the cache."""
-    before = len(_held)
+    before, maker = len(_held), dispatcher.targetctx.codegen()
+    maker._library_class, libraries = _Whole, maker._library_class
     try:
         dispatcher.compile(signature)
     except Exception:  # the cache cannot be written, on a full disk: do without
         dispatcher._cache = caching.NullCache()
         dispatcher.compile(signature)
     finally:
+        maker._library_class = libraries
         while len(_held) > before:
             with suppress(OSError):  # a disk without locks
                 fcntl.lockf(_lock, fcntl.LOCK_UN, 1, _held.pop())

@@ -104,6 +104,48 @@ def test_a_kernel_for_kernels_alone_is_compiled_with_its_caller_and_never_loaded
     assert [python(LOADED, tmp_path) for _ in range(2)] == ["1 1\n", "1 0\n"]
 
 
+SELF_CONTAINED = """
+import math
+from brakecli.solver.compile import kernel
+from numba import float64, void
+
+@kernel(float64(float64), inlined=False)
+def helper(x):  # too long for the compiler to inline it of its own accord
+STEPS    return x
+
+@kernel(float64(float64))
+def caller(x):
+    return helper(x) + helper(2.0 * x)
+
+(compiled,) = caller.overloads.values()
+for function in compiled.library._get_module_for_linking().functions:
+    if not function.is_declaration:
+        print("helper" in function.name, function.linkage.name)
+""".replace("STEPS", 20 * "    x = math.sin(x) / (1.0 + x * x)\n")
+
+
+def test_a_kernel_takes_no_other_copy_of_what_it_calls_than_its_own(tmp_path: Path) -> None:
+    """Otherwise one that a process has just compiled and one that it has loaded may add in another order."""
+    lines = python(SELF_CONTAINED, tmp_path).splitlines()
+    assert [line for line in lines if line.startswith("True")] == ["True internal"]
+
+
+RECORDS = """
+import hashlib
+from pathlib import Path
+from brakecli.sweeps.workers.task import compute_units
+from tests.sweeps.test_together import rough
+plan = rough(Path("FOLDER"), 12).plan
+print(hashlib.sha256(compute_units(plan, 0, plan.points)).hexdigest())
+"""
+
+
+@campaign
+def test_a_process_that_compiles_computes_the_bytes_of_one_that_loads(tmp_path: Path) -> None:
+    one, other = (python(RECORDS.replace("FOLDER", str(tmp_path)), tmp_path / "cache") for _ in range(2))
+    assert one == other
+
+
 def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> None:
     kernel: Any = event_driven.solve
     (compiled,) = kernel.overloads.values()
