@@ -8,7 +8,7 @@ import numpy as np
 from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.stability.modes import growth, is_undamped
-from brakecli.branches.begin import UNKNOWN, End, on_rough_pads, on_smooth_pads
+from brakecli.branches.begin import UNKNOWN, End, on_smooth_pads
 from brakecli.branches.line import Shoe
 from brakecli.errors import CaseError
 from brakecli.solver.automaton import STICK
@@ -59,6 +59,8 @@ def _level(flat: System, orbit: Orbit) -> float:
 
 def _on_a_rough_shoe(flat: System, state: Floats) -> End:
     """The end of a motion whose force is a curve of y alone; unknown where no dashpot makes it settle."""
+    from brakecli.branches.rough_end import on_rough_pads  # only these wait for its kernels
+
     if is_undamped(flat.coefficients):
         return UNKNOWN
     try:

@@ -12,9 +12,10 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
-from brakecli.branches.begin import FADES, UNKNOWN, End, on_rough_pads, on_smooth_pads
+from brakecli.branches.begin import FADES, UNKNOWN, End, on_smooth_pads
 from brakecli.branches.line import Line, Shoe
 from brakecli.branches.problem import Array
+from brakecli.branches.rough_end import on_rough_pads
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError

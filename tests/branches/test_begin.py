@@ -7,11 +7,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.branches import begin
-from brakecli.branches.begin import End, on_rough_pads, on_smooth_pads, settled
+from brakecli.branches import begin, rough_end
+from brakecli.branches.begin import End, on_smooth_pads, settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line, Shoe
+from brakecli.branches.rough_end import on_rough_pads
 from brakecli.case.system import system_of
 from brakecli.solver.steady_sliding import steady_sliding
 from tests.analysis.shoes import Shoe as Drawn
@@ -76,7 +77,7 @@ def test_a_motion_that_dies_out_begins_no_branch() -> None:
 def test_a_motion_that_takes_too_many_steps_is_not_known(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(begin, "MOST_STEPS", 0)
     assert on_smooth_pads(*of_smooth(0.18)).lasts is None
-    monkeypatch.setattr(begin, "MOST_ROUGH_STEPS", 1)
+    monkeypatch.setattr(rough_end, "MOST_ROUGH_STEPS", 1)
     assert of_rough(1.53).lasts is None
 
 
@@ -111,7 +112,7 @@ def test_a_motion_on_rough_pads_comes_to_what_event_driven_runs_show(friction: f
 def test_what_fades_slowly_beside_the_loss_of_stability_does_not_last(monkeypatch: pytest.MonkeyPatch) -> None:
     """Event-driven runs of 20 s come nearer to the forced motion to their end: by three tenths in the last 8 s."""
     assert of_rough(2.232, seed=11).lasts is not True
-    monkeypatch.setattr(begin, "NOTICED", 0.0)
+    monkeypatch.setattr(rough_end, "NOTICED", 0.0)
     assert of_rough(2.232, seed=11).lasts is True
 
 
@@ -122,8 +123,8 @@ def test_a_vibration_that_has_just_vanished_does_not_last(friction: float, lasts
 
 
 def test_what_obeys_linear_equations_once_by_chance_does_not_fade(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(begin, "IN_A_ROW", 1)
-    monkeypatch.setattr(begin, "TURNS", math.inf)
+    monkeypatch.setattr(rough_end, "IN_A_ROW", 1)
+    monkeypatch.setattr(rough_end, "TURNS", math.inf)
     assert of_rough(1.53).lasts is False
 
 

@@ -327,6 +327,14 @@ def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> Non
     assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
 
 
+def test_vibration_on_smooth_pads_waits_for_no_kernels_of_rough_ones(tmp_path: Path) -> None:
+    """Whether it lasts is asked of the flow on smooth pads."""
+    loaded = loaded_by(["run", str(ROOT / "cases" / "relaxation.toml"), "--output", "r.h5"], tmp_path)
+    assert "brakecli.solver.flow.seek" in loaded
+    unused = {f"brakecli.solver.{name}" for name in ("flow.rough", "schemes.event_driven", "contact.midpoint")}
+    assert loaded.isdisjoint(unused)
+
+
 def test_a_sweep_without_a_search_waits_for_no_kernels_of_branches(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     axis = '[[axis]]\nparameter = "load.force"\nvalues = [1000.0, 2000.0]\n'

@@ -17,7 +17,7 @@ from brakecli.runs.limits import check
 from brakecli.solver.method import Method
 from brakecli.solver.motion import Motion, Stepping, solve
 from brakecli.solver.quantities import HISTORY, ContactState, Failure
-from brakecli.solver.schemes.event_driven.runge_kutta import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
+from brakecli.solver.runge_kutta import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
 from tests.campaign import counts
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact

@@ -41,7 +41,7 @@ from brakecli.solver.contact.pad import aligned
 from brakecli.solver.double_double import two_product
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Parts, X, Y, new, record
 from brakecli.solver.roughness import Surface, wheel_angles
-from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, USED, A
+from brakecli.solver.runge_kutta import END_STAGE, NODES, USED, A
 from brakecli.solver.sine import sine_cosine
 from brakecli.solver.system import System
 

@@ -13,8 +13,8 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
 from brakecli.solver.quantities import Failure
 from brakecli.solver.records import EVALUATE, MOTION, V_X, V_Y, Plant, Weights, X, Y, plant_type
+from brakecli.solver.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
-from brakecli.solver.schemes.event_driven.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 from brakecli.solver.tangent import renew
 from brakecli.solver.track import mark

@@ -10,14 +10,15 @@ import math
 import numpy as np
 from numba import float64, int64, void
 
+from brakecli.solver import runge_kutta
 from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import kernel, stopped
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
 from brakecli.solver.records import DISTURBED, GRID, SPANS, STAGES, V_X, V_Y, Grid, X, Y
-from brakecli.solver.schemes.event_driven import phases, runge_kutta
+from brakecli.solver.runge_kutta import END_STAGE
+from brakecli.solver.schemes.event_driven import phases
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
-from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE
 
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (5, 3, 12)]
 POINTS = np.array([len(places) for places, _ in _RULES])

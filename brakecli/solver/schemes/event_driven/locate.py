@@ -7,8 +7,8 @@ from numba import float64, int64, types
 from brakecli.solver.automaton import HEIGHT, OPEN, STICK, side_of
 from brakecli.solver.compile import kernel
 from brakecli.solver.records import V_X, Y
+from brakecli.solver.runge_kutta import reach
 from brakecli.solver.schemes.event_driven.phases import EPSILON, NEAR, SHOE, Shoe, margins, rounding
-from brakecli.solver.schemes.event_driven.runge_kutta import reach
 
 NONE = -1
 LOOKS = 8

@@ -28,8 +28,8 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
 from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, X, Y
 from brakecli.solver.roughness import turn
+from brakecli.solver.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.schedules import integral_at, slope_at, value_at
-from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.tangent import kept
 
 EPSILON = 2.220446049250313e-16

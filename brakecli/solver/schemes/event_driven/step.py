@@ -5,17 +5,18 @@ from typing import Any
 
 from numba import float64, int64, void
 
+from brakecli.solver import runge_kutta
 from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
+from brakecli.solver.runge_kutta import END_STAGE, NODES, ORDER, USED, A
 from brakecli.solver.schedules import Schedule, segment
-from brakecli.solver.schemes.event_driven import phases, runge_kutta
+from brakecli.solver.schemes.event_driven import phases
 from brakecli.solver.schemes.event_driven.error import grow
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
-from brakecli.solver.schemes.event_driven.runge_kutta import END_STAGE, NODES, ORDER, USED, A
 from brakecli.solver.track import enter, put, turned
 
 _LOCAL = 0.05

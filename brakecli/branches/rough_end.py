@@ -1,0 +1,145 @@
+"""What a motion on rough pads comes to in the end: it fades, or it keeps its distance from all that is calm."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from brakecli.analysis.stability.modes import slowest_of_cycles
+from brakecli.branches.begin import FADES, UNKNOWN, End
+from brakecli.branches.problem import Array
+from brakecli.solver.flow.rough import RoughFlow, Status, default_steps
+from brakecli.solver.period import common_period
+from brakecli.solver.system import System
+
+SPAN = 10.0
+"""Periods of the slowest mode, at least, in a span of whole common periods, at whose ends motions on rough pads
+are compared. The waves and the shoe's own vibration meet in many ways within it."""
+MOST_ROUGH_STEPS = 2_000_000
+"""Steps of a motion on rough pads after which it is given up."""
+FOLLOWS = 0.5
+"""Part of what a disturbance loses in a span, by which its size may differ from that of a linear one."""
+TURNS = 0.25
+"""Part of its size by which a disturbance may differ at the end from a linear one."""
+IN_A_ROW = 3
+"""Spans over which a motion has to obey them: one that lasts may do so in one of them, by chance."""
+AT_CALM = 1e-9
+"""Distance from a calm motion, over the compression of the pad, that is rounding."""
+KEPT = 0.99
+"""Part of its distance from all calm motions that a vibration which lasts keeps in a time twice as long."""
+DRIFTS, STILL = 4.0, 1e-6
+"""Standard errors of its slope beyond which that distance falls, and a fall that is none. Beside a value at which
+a vibration vanishes a motion keeps nearly all of its distance for long, but it falls steadily."""
+SETTLING = 1.0
+"""Powers of e by which the dashpots shrink a disturbance of a vibration before its distances are compared."""
+NOTICED = 0.2
+"""The same of the slowest disturbance of a calm motion: one that fades a twentieth as fast is seen to fade."""
+
+
+class _Span:
+    """The flow of rough pads over whole common periods, which begins at t = 0 of the waves.
+
+    Where the wheel is smooth no time is different from another.
+    """
+
+    def __init__(self, system: System) -> None:
+        self.flow, slow = RoughFlow(system), system.natural_frequencies[0]
+        period = common_period(system) or SPAN / slow
+        self.length = period * math.ceil(SPAN / (slow * period))
+        self.parts = math.ceil(self.length * slow)
+        self.steps = default_steps(system, self.length / self.parts)
+        self.taken = 0
+        c = system.coefficients
+        self.weights = np.zeros((4, 4))  # of twice the energy
+        self.weights[:2, :2] = [[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + system.contact_stiffness]]
+        self.weights[2, 2] = self.weights[3, 3] = c.m
+        self.scales = 1.0 / np.sqrt(np.diag(self.weights))
+        depth = abs(system.load_at_start) / (c.c_yy + system.contact_stiffness)
+        self.rounding = AT_CALM * depth / self.scales[1]
+
+    def __call__(self, state: Array, tangents: bool) -> tuple[Array, Array] | None:
+        """The states at the ends of all parts, and the derivative of the last one; None where there is no flow."""
+        states, matrix, length = [state], np.eye(4), self.length / self.parts
+        for part in range(self.parts):
+            run = self.flow(states[-1], part * length, length, self.steps, tangents)
+            if run.status is not Status.DONE:
+                return None
+            states.append(run.state)
+            matrix = matrix if run.derivative is None else run.derivative @ matrix
+        self.taken += self.parts * self.steps
+        return np.array(states), matrix
+
+
+class _Calm:
+    """A stable motion that is no vibration, over a span, and what becomes of disturbances of it."""
+
+    def __init__(self, span: _Span, states: Array, matrix: Array) -> None:
+        self.span, self.states = span, states
+        self.factors, vectors = np.linalg.eig(matrix * span.scales / span.scales[:, None])
+        self.radius = float(np.abs(self.factors).max())
+        self.to_modes = np.linalg.inv(vectors) / span.scales
+
+    def attracts(self, states: Array) -> bool:
+        """Whether a motion obeys, over the span, the linear equations of disturbances, which die out.
+
+        The sizes of modes are theirs but for less than what they lose, however little that is. A mode of a larger
+        vibration turns a little faster or slower.
+        """
+        begin, end = (self.to_modes @ (states[k] - self.states[k]) for k in (0, -1))
+        said, size = self.factors * begin, float(np.abs(end).sum())
+        off = float(np.abs(np.abs(end) - np.abs(said)).sum())
+        turned = float(np.abs(end - said).sum())
+        loss = (1.0 - self.radius) * size  # of the slowest modes, which are those at the end
+        rounding = self.span.rounding
+        return self.radius < 1.0 and off <= FOLLOWS * loss + rounding and turned <= TURNS * size + rounding
+
+    def distance(self, states: Array) -> float:
+        """The largest distance of a motion within the span, as the root of twice the energy that it takes."""
+        apart = states - self.states
+        return math.sqrt(float(np.einsum("ni,ij,nj->n", apart, self.span.weights, apart).max()))
+
+
+def on_rough_pads(system: System, state: Array, calm: Sequence[Array], longest: float = math.inf) -> End:
+    """What the motion from a state at t = 0 comes to, at constant speed and load, in a `longest` time (s).
+
+    `calm`: states at t = 0 of the stable motions that are no vibrations: of steady sliding on a smooth wheel, else
+    of what the waves force. The motion fades once it follows the linear equations of one of them. It lasts once
+    it has kept its distance from all of them in a time twice as long. Unknown without any of them.
+    """
+    span, known = _Span(system), list[_Calm]()
+    for each in calm:
+        flown = span(np.array(each, float), True)
+        if flown is None:
+            return UNKNOWN
+        try:
+            known.append(_Calm(span, *flown))
+        except np.linalg.LinAlgError:  # disturbances that are alike
+            return UNKNOWN
+    last, far, drawn = np.array(state, float), list[float](), 0
+    spans = [SETTLING / (slowest_of_cycles(system.coefficients) * span.length)]
+    spans += [NOTICED / -math.log(each.radius) for each in known if 0.0 < each.radius < 1.0]
+    while known and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < longest:
+        flown = span(last, False)
+        if flown is None:
+            break
+        drawn = drawn + 1 if any(each.attracts(flown[0]) for each in known) else 0
+        if drawn == IN_A_ROW:
+            return FADES
+        last = flown[0][-1]
+        far.append(min(each.distance(flown[0]) for each in known))
+        quarter, rest = divmod(len(far), 4)
+        whole = rest == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
+        kept = whole and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter])
+        if kept and quarter >= max(spans) and not _falls(far[quarter:]):
+            return End(True, last)
+    return UNKNOWN
+
+
+def _falls(far: list[float]) -> bool:
+    """Whether distances fall from span to span, by a line through the logarithms of the means of eighths."""
+    means = [math.log(float(np.mean(part))) for part in np.array_split(far, min(len(far), 8))]
+    places = np.arange(len(means)) - 0.5 * (len(means) - 1)
+    slope, square = float(places @ means / (places @ places)), float(places @ places)
+    rest = np.array(means) - np.mean(means) - slope * places
+    error = math.sqrt(float(rest @ rest) / (len(means) - 2) / square)
+    return slope < -max(DRIFTS * error, STILL / len(means))
