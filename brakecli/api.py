@@ -3,12 +3,11 @@
 import json
 import multiprocessing
 import os
-import signal
 import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, nullcontext
 from dataclasses import replace
 from datetime import date, time
 from functools import partial
@@ -19,7 +18,6 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.faces import in_python
-from brakecli.files.os_signals import Interrupted, unwinding
 from brakecli.files.trust import readings
 from brakecli.stop import signals_shown
 
@@ -688,17 +686,10 @@ def _telling(progress: "Progress") -> Iterator["Counted"]:
 
 @contextmanager
 def _interruptible() -> Iterator[None]:
-    """Let Ctrl-C end compiled code, too, and remove unfinished files; other threads hear no signals."""
-    if threading.current_thread() is not threading.main_thread():
-        with in_python():
-            yield
-        return
-    try:
-        with signals_shown(), unwinding(), in_python():
-            yield
-    except Interrupted as error:
-        asked = error.exit_code == 128 + signal.SIGINT
-        raise (KeyboardInterrupt() if asked else SystemExit(error.exit_code)) from None
+    """Let Ctrl-C end compiled code, too; other threads hear no signals."""
+    hears = threading.current_thread() is threading.main_thread()
+    with signals_shown() if hears else nullcontext(), in_python():
+        yield
 
 
 @contextmanager

@@ -22,18 +22,40 @@ except (AttributeError, OSError):  # some systems have no such files: kernels th
 
 def show_signals() -> None:
     """Show kernels the signals that come from now on."""
+    signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
+
+
+def check_signals() -> None:
+    """Raise KeyboardInterrupt after Ctrl-C, and SystemExit after another signal that kernels have given up on.
+
+    Python's handler has raised one already. It is lost where it comes out of a finalizer, or out of the C code in
+    front of a compiled function, and what kernels have given up is worth nothing.
+    """
+    if (number := memory[0]) in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
+        raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)
+
+
+def hide_signals(file: int = -1) -> None:
+    """Let kernels see no signals any more, nor those that have come; `file` is to hear of the next ones."""
+    signal.set_wakeup_fd(file)
+    memory[:8] = bytes(8)
     if _file >= 0:
-        signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
+        os.lseek(_file, 0, os.SEEK_SET)
 
 
 @contextmanager
 def signals_shown() -> Iterator[None]:
-    """Show kernels the signals that come within the block, in a program that goes on afterwards."""
+    """Show kernels the signals that come within the block, in a program that goes on afterwards.
+
+    A block in which one came ends as `check_signals` says, whatever it has made of it.
+    """
     before = signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
     try:
         yield
+    except Exception:
+        check_signals()
+        raise
+    else:
+        check_signals()
     finally:
-        signal.set_wakeup_fd(before)
-        memory[:8] = bytes(8)
-        if _file >= 0:
-            os.lseek(_file, 0, os.SEEK_SET)
+        hide_signals(before)

@@ -4,9 +4,9 @@ from dataclasses import replace
 from typing import Annotated
 
 from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
-from brakecli.cli.output import progress, show_result, warn
+from brakecli.cli.output import show_result, warn
 from brakecli.front.inputs import load_case, load_study
-from brakecli.front.progress import say
+from brakecli.front.progress import say, telling
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
 STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study, in place of its case."
@@ -34,7 +34,7 @@ def command(
     from brakecli.runs.run import load_kernels
 
     load_kernels(loaded)
-    with progress(quiet) as show_progress, within_range():
+    with telling(quiet) as show_progress, within_range():
         if (seconds := advise_seconds(loaded)) > WORTH_SAYING and not quiet:
             say(f"a rough pad: this takes about {duration_text(seconds)}")
         report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)

@@ -17,7 +17,6 @@ from brakecli.cli.options import option
 from brakecli.cli.output import announce_compilation, show, warn
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.faces import as_argument
-from brakecli.files.os_signals import Interrupted
 from brakecli.files.trust import readings
 from brakecli.front.progress import say
 from brakecli.solver import compiling
@@ -67,8 +66,6 @@ def main() -> None:
         app()
     except BrakecliError as error:
         message, code = str(error), error.exit_code
-    except Interrupted as error:
-        message, code = f"{error}; {error.left}", error.exit_code
     except MemoryError:
         message, code = "out of memory; reduce contact.nodes, or sample less often", 3
     except OSError as error:  # not of an input or output, but of a file such as the cache of compiled code

@@ -5,9 +5,11 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
-from brakecli.cli.output import progress, show_result
-from brakecli.files.os_signals import Interrupted, signals_deferred
+from brakecli.cli.output import show_result
+from brakecli.files.os_signals import lastly, signals_deferred
 from brakecli.front.inputs import load_case, result_path
+from brakecli.front.progress import telling
+from brakecli.stop import hide_signals
 
 PARAMETER = "Follow all motions along a key, or along several that take the same value."
 START = "Also follow the motion that the end of this run comes to; repeatable."
@@ -40,20 +42,18 @@ def command(
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
 
-    with progress(quiet) as tell:
+    with telling(quiet) as tell:
         with within_range():
             line = line_of(loaded, keys, low, high, f"--parameter {parameter}")
         units = unit(keys[0])
         starts = [start_of(path, keys) for path in start or ()]
         with new_output(target, force=force) if target else nullcontext():  # whether it can be written
             pass
-        try:
-            with signals_deferred() as waiting:
-                found = branch(line, tell, lambda: bool(waiting), starts, switch)
-                if target:
-                    write(target, loaded, found, units, force=force)
-        except Interrupted as error:
-            error.left = f"what was followed up to here is in {target}" if target else error.left
-            raise
+        kept = f"what was followed up to here is in {target}" if target else ""
+        with lastly(lambda: kept), signals_deferred() as waiting:
+            found = branch(line, tell, lambda: bool(waiting), starts, switch)
+            hide_signals()  # from what writes the file
+            if target:
+                write(target, loaded, found, units, force=force)
     numbers = {**values_of(BRANCH, found), "output": target and str(target)}
     show_result("branch", numbers, branch_table, loaded.case.title, found, units, as_json=as_json, quiet=quiet)

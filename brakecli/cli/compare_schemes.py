@@ -4,8 +4,9 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
-from brakecli.cli.output import progress, show_result
+from brakecli.cli.output import show_result
 from brakecli.front.inputs import load_case, result_path
+from brakecli.front.progress import telling
 from brakecli.solver.schemes import SCHEMES
 
 STEPS = "Time steps in s; the largest is a whole multiple of each."
@@ -37,7 +38,7 @@ def command(
 
     chosen, ladder = parse_schemes(schemes), parse_steps(steps)
     system = load_kernels(loaded)
-    with progress(quiet) as show_progress:
+    with telling(quiet) as show_progress:
         with new_output(target, force=force):  # whether it can be written is known before anything is computed
             pass
         found = compare(system, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)

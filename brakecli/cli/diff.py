@@ -5,7 +5,6 @@ from typing import Annotated
 
 from brakecli.cli.options import AsJson, Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show_result
-from brakecli.files.os_signals import unwinding
 
 VARIABLE = "What is drawn of two runs, vx if left out, or of two other results."
 
@@ -27,12 +26,11 @@ def command(
     from brakecli.files.read import open_result
     from brakecli.front.file_tables import diff_table
 
-    with unwinding():
-        with open_result(first) as a, open_result(second) as b:
-            numbers = values_of(fields.DIFFERENCE_OF_TWO, difference(a, b))
-        if output is not None:
-            from brakecli.plots.result import plot_two
+    with open_result(first) as a, open_result(second) as b:
+        numbers = values_of(fields.DIFFERENCE_OF_TWO, difference(a, b))
+    if output is not None:
+        from brakecli.plots.result import plot_two
 
-            plot_two(first, second, output, force=force, variable=variable or "")
+        plot_two(first, second, output, force=force, variable=variable or "")
     files = {"a": str(first), "b": str(second), "output": output and str(output)}
     show_result("diff", {**files, **numbers}, diff_table, files, numbers, as_json=as_json, quiet=quiet)

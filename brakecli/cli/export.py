@@ -5,7 +5,6 @@ from typing import Annotated
 
 from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
-from brakecli.files.os_signals import unwinding
 from brakecli.front.inputs import result_path
 
 GROUP = "Of a run: history (default), spectrum, over_time, spectrogram, vibrations."
@@ -26,7 +25,7 @@ def command(
     from brakecli.files.read import open_result
 
     target = result_path(output, str(result), ending=".csv")
-    with unwinding(), open_result(result) as stored:
+    with open_result(result) as stored:
         notes = export(stored, target, group, variables or (), force=force)
     warn(*notes)
     if not quiet:

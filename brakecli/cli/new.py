@@ -10,7 +10,6 @@ from brakecli.cli.options import Force, Quiet, option, output_option
 from brakecli.cli.output import show
 from brakecli.errors import UsageError, printable
 from brakecli.faces import as_argument
-from brakecli.files.os_signals import unwinding
 from brakecli.front.progress import say
 
 NAME = "Name of the file, with or without .toml; that of a starter gives this one, others the starter of a case."
@@ -42,7 +41,7 @@ def command(
     if base and not (path.parent / base).exists():
         written[path.parent / base] = texts[base.removesuffix(".toml")]
     for place, content in written.items():
-        with unwinding(), new_output(place, force=force) as file:
+        with new_output(place, force=force) as file:
             file.write(content.encode())
             file.publish()
     if not quiet:

@@ -2,13 +2,12 @@
 
 import json
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from brakecli.files.os_signals import Styled, unwinding
+from brakecli.files.os_signals import Styled
 from brakecli.files.trust import readings
-from brakecli.front.progress import say, telling
+from brakecli.front.progress import say
 
 
 def show(text: str) -> None:
@@ -41,13 +40,3 @@ def announce_compilation(trouble: str) -> None:
     """Say that kernels are being compiled, and what keeps the cache from being used."""
     say("compiling the numerical kernels, once for this version; this may take half a minute")
     warn(*filter(None, [trouble]))
-
-
-@contextmanager
-def progress(quiet: bool) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield a function that shows what is counted, how many are done, and how many there are.
-
-    Within, a signal raises `Interrupted`.
-    """
-    with unwinding(), telling(quiet) as tell:
-        yield tell

@@ -8,7 +8,6 @@ from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option,
 from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError
 from brakecli.faces import as_argument
-from brakecli.files.os_signals import unwinding
 from brakecli.front.inputs import COMMANDS, kind_of_file
 from brakecli.front.measured import Measured
 
@@ -50,13 +49,10 @@ def command(
 
         look = measured.look_at(result)
         warn(*look.verdict.warnings)
-        with unwinding():
-            plot_signal(look, result, target, force=force)
+        plot_signal(look, result, target, force=force)
     else:
         from brakecli.plots.result import plot_result
 
-        with unwinding():
-            asked = select or (), variable or "", section or ""
-            plot_result(Path(result), target, *asked, force=force)
+        plot_result(Path(result), target, select or (), variable or "", section or "", force=force)
     if not quiet:
         show(f"{target}: written")

@@ -4,7 +4,8 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import Force, ForceRead, Quiet, output_option, source_argument
-from brakecli.cli.output import progress, show
+from brakecli.cli.output import show
+from brakecli.front.progress import telling
 
 RESULTS = "Results of any kind; two of one kind stand beside each other."
 
@@ -21,7 +22,7 @@ def command(
     from brakecli.runs.limits import within_range
 
     target = output or Path("report.html")
-    with progress(quiet) as show_progress, within_range():
+    with telling(quiet) as show_progress, within_range():
         write_report(results, target, force=force, progress=show_progress)
     if not quiet:
         show(f"{target}: written")

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import AsJson, Force, ForceRead, Overrides, Quiet, output_option, source_argument
-from brakecli.cli.output import progress, show_result, warn
+from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_case, result_path
-from brakecli.front.progress import say
+from brakecli.front.progress import say, telling
 
 SOURCE = 'Case file, "-" for standard input, or a result file, whose case is run again.'
 
@@ -28,7 +28,7 @@ def command(
     from brakecli.runs.run import load_kernels, origin, run
 
     load_kernels(loaded)
-    with progress(quiet) as show_progress:
+    with telling(quiet) as show_progress:
         report = run(loaded, target, force=force, progress=show_progress)
     if not quiet:
         say(*report.check.adjustments)

@@ -5,9 +5,10 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import SET, AsJson, Force, Quiet, option, output_option, source_argument
-from brakecli.cli.output import progress, show_result, warn
+from brakecli.cli.output import show_result, warn
 from brakecli.cli.sweep import JOBS, SCHEDULER, SCHEDULER_FILE
 from brakecli.front.inputs import load_study, result_path
+from brakecli.front.progress import telling
 
 SETTING = "Set a key of the study, as samples, or of its case; repeatable."
 
@@ -31,7 +32,7 @@ def command(
     from brakecli.sweeps.driver import keeping_points
 
     engine_of = partial(engine_for, jobs=jobs, scheduler=scheduler, scheduler_file=scheduler_file)
-    with progress(quiet) as tell, keeping_points(target):
+    with telling(quiet) as tell, keeping_points(target):
         report = scatter(loaded, target, engine_of, force=force, tell=tell)
     if report.failed:
         warn(f"{report.failed} of {report.samples} samples have no answer, the first: {report.first_failure}")

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
-from brakecli.cli.output import progress, show_result
+from brakecli.cli.output import show_result
 from brakecli.errors import UsageError, printable
 from brakecli.front.inputs import load_case, result_path
-from brakecli.front.progress import say
+from brakecli.front.progress import say, telling
 
 if TYPE_CHECKING:
     from brakecli.sweeps.tables import Axis
@@ -41,7 +41,7 @@ def command(
     from brakecli.front.stability_tables import stability_table
     from brakecli.runs.limits import sliding_text, within_range
 
-    with progress(quiet) as show_progress, within_range():
+    with telling(quiet) as show_progress, within_range():
         if (text := sliding_text(system := system_of(loaded.case))) and not quiet:
             say(text)
         report, found, both = stability(system), None, None

@@ -4,10 +4,10 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.options import SET, AsJson, Quiet, option, output_option, source_argument
-from brakecli.cli.output import progress, show_result, warn
+from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_sweep, result_path
-from brakecli.front.progress import say
+from brakecli.front.progress import say, telling
 
 JOBS = "Worker processes  [default: one for each core]"
 SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
@@ -41,7 +41,7 @@ def command(
     from brakecli.sweeps.driver import choose_engine, counting, keeping_points, sweep
 
     load_kernels(loaded.base)
-    with progress(quiet) as show_progress:
+    with telling(quiet) as show_progress:
 
         def begin(found: Estimate, resumed: int) -> None:
             if not quiet:

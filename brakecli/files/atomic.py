@@ -17,7 +17,8 @@ from typing import Any
 
 from brakecli.errors import CannotWriteError, UsageError
 from brakecli.faces import argument
-from brakecli.files.os_signals import signals_deferred
+from brakecli.files.os_signals import lastly, signals_deferred
+from brakecli.stop import check_signals
 
 _REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "free some space there, or "),
@@ -77,6 +78,7 @@ class OutputFile(FileIO):
 
     def publish(self) -> None:
         """Put the finished file in the place of the target, on the disk and not only in its cache."""
+        check_signals()
         self.check()
         with explained(self.path):
             os.fsync(self.fileno())
@@ -122,7 +124,12 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     """
     target = _checked_target(path, force=force)
     lock, clean_up = target.with_name(f".{target.name}.lock"), ExitStack()
-    try:
+
+    def leave_nothing() -> str:
+        clean_up.close()
+        return "nothing unfinished was left behind"
+
+    with lastly(leave_nothing):
         with signals_deferred(), explained(path):
             descriptor = _acquired(path, lock)
             clean_up.callback(_release, descriptor, lock)
@@ -138,9 +145,6 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
         except Exception:
             output.check()  # the cause, where the exception is only a consequence of a failed write
             raise
-    finally:
-        with signals_deferred():
-            clean_up.close()
 
 
 def _checked_target(path: Path, *, force: bool) -> Path:

@@ -9,7 +9,7 @@ import signal
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from types import FrameType
 from typing import Any
 
@@ -18,32 +18,27 @@ from brakecli.stop import show_signals
 
 _WORDS: dict[int, str] = {
     signal.SIGHUP: "hung up",
-    signal.SIGINT: "interrupted",
     signal.SIGTERM: "terminated",
-    signal.SIGALRM: "timed out",
+    signal.SIGINT: "interrupted",  # last: a KeyboardInterrupt cuts through what handles the signals in their order
 }
-
-
-class Interrupted(BaseException):
-    """A signal has arrived, and the program unwinds."""
-
-    left = "nothing unfinished was left behind"
-
-    def __init__(self, number: int) -> None:
-        """Remember which signal it was."""
-        super().__init__(_WORDS[number])
-        self.exit_code = 128 + number
+_last: list[Callable[[], str | None]] = []  # what `lastly` still has to call
 
 
 def handle_signals() -> None:
-    """Let a signal end the process at once.
+    """Let a signal end the process at once, after what `lastly` has been given.
 
-    No exception passes through imports, which may turn it into another one.
+    No exception passes through the program, which might lose it or turn it into another one.
     """
 
     def leave(number: int, frame: FrameType | None) -> None:
+        ignore_signals()
+        left = ""
         try:
-            os.write(2, f"brakecli: {_WORDS[number]}\n".encode())
+            while _last:
+                with suppress(Exception):  # a failing disk, or a bar that is just being drawn
+                    left = _last.pop()() or left
+            said = "; ".join(filter(None, (_WORDS[number], escaped(left))))
+            os.write(2, f"brakecli: {said}\n".encode(errors="backslashreplace"))
         finally:
             os._exit(128 + number)
 
@@ -59,77 +54,41 @@ def ignore_signals() -> None:
 
 
 @contextmanager
-def unwinding() -> Iterator[None]:
-    """Within the block, the first signal raises `Interrupted`, so that unfinished files are removed.
+def lastly(act: Callable[[], str | None]) -> Iterator[None]:
+    """Call `act` at the end of the block, whatever ends it: also a signal that ends the process.
 
-    Later signals are ignored, as they would cut through the clean-up. The C code in front of a compiled function
-    calls back into Python, and loses exceptions or turns them into others, and finalizers lose them, too: there, a
-    timer asks again soon.
-    Whatever the block has made of it, its end is an interruption: compiled code has given up what it was doing.
+    After a signal the inner blocks come first. A text that the outermost `act` returns is what the user is told.
     """
-    arrived: list[int] = []
-    raised: list[Interrupted] = []
-
-    def note(number: int, frame: FrameType | None) -> None:
-        arrived.append(number)
-        while frame is not None and frame.f_globals.get("__name__", "").split(".")[0] not in ("numba", "llvmlite"):
-            frame = frame.f_back
-        if frame is not None:
-            signal.setitimer(signal.ITIMER_REAL, 0.01)
-        elif not raised:
-            raised.append(Interrupted(arrived[0]))
-            raise raised[0]
-
-    def lost(unraisable: Any) -> None:
-        if unraisable.exc_value in raised:
-            raised.clear()
-            signal.setitimer(signal.ITIMER_REAL, 0.01)
-        else:
-            report(unraisable)
-
-    report, sys.unraisablehook = sys.unraisablehook, lost
-    with _handled_by(note):
-        try:
-            yield
-        except Exception:
-            if arrived:
-                raise Interrupted(arrived[0]) from None
-            raise
-        finally:
-            signal.setitimer(signal.ITIMER_REAL, 0.0)
-            sys.unraisablehook = report
-        if arrived:
-            raise Interrupted(arrived[0])
+    _last.append(act)
+    try:
+        yield
+    finally:
+        with signals_deferred():
+            _last.remove(act)
+            act()
 
 
 @contextmanager
 def signals_deferred() -> Iterator[list[int]]:
-    """Hold back Ctrl-C, SIGTERM, SIGHUP and the timer of `unwinding` until the block has ended; yields those held.
+    """Hold back Ctrl-C, SIGTERM and SIGHUP until the block has ended; yields those held.
 
-    An exception out of a handler must not cut through HDF5, which calls back into Python, nor through a clean-up.
+    In Python, Ctrl-C raises an exception, which must not cut through HDF5, which calls back into Python, nor
+    through a clean-up.
     """
     waiting: list[int] = []
     if threading.current_thread() is not threading.main_thread():  # Python runs handlers in the main thread only
         yield waiting
         return
-    try:
-        with _handled_by(lambda number, _frame: waiting.append(number)):
-            yield waiting
-    finally:
-        for number in waiting:
-            signal.raise_signal(number)
-
-
-@contextmanager
-def _handled_by(handler: Callable[[int, FrameType | None], None]) -> Iterator[None]:
     before = _handlers()
     try:
         for number in before:
-            signal.signal(number, handler)
-        yield
+            signal.signal(number, lambda number, _frame: waiting.append(number))
+        yield waiting
     finally:
         for number, old in before.items():
             signal.signal(number, old)
+        for number in waiting:
+            signal.raise_signal(number)
 
 
 def _handlers() -> dict[int, Any]:

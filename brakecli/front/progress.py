@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from textwrap import wrap
 from typing import TextIO, cast
 
-from brakecli.files.os_signals import Styled
+from brakecli.files.os_signals import Styled, lastly
 
 FIRST_LINE, LAST_LINES = 20.0, 600.0
 """Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
@@ -49,7 +49,9 @@ def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[s
 
     console = Console(file=cast(TextIO, Styled(sys.stderr)))
     columns = (*rich_progress.Progress.get_default_columns(), rich_progress.MofNCompleteColumn())
-    with rich_progress.Progress(*columns, console=console, transient=True) as bar:
+    bar = rich_progress.Progress(*columns, console=console, transient=True)
+    with lastly(bar.stop):
+        bar.start()
         task = bar.add_task("", visible=False)
 
         def show(what: str, done: int, total: int) -> None:

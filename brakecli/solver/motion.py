@@ -40,6 +40,7 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponent, seed
 from brakecli.solver.track import Track, follow, tracked
+from brakecli.stop import check_signals
 
 EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
@@ -200,6 +201,7 @@ class Stepping:
             seconds = time.perf_counter() - start
             work.solve_seconds += seconds
             size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, most)
+            check_signals()
             sink(rows)
             progress(int(self.counts.level) - lag)
         if not work.failed:

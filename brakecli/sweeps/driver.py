@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.errors import BrakecliError, CannotWriteError
-from brakecli.files.os_signals import Interrupted
+from brakecli.files.os_signals import lastly
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.solver.motion import Counted
@@ -167,15 +167,16 @@ def journal_path(output: Path) -> Path:
 @contextmanager
 def keeping_points(output: Path) -> Iterator[None]:
     """Add to the message on an interruption, or on a failed write, that finished points are kept, if they are."""
+
+    def kept() -> str:
+        there = (journal := journal_path(output)).is_file() and not journal.is_symlink()
+        return "finished points are kept, and the same command goes on with them" if there else ""
+
     try:
-        yield
-    except (CannotWriteError, Interrupted) as error:
-        if (journal := journal_path(output)).is_file() and not journal.is_symlink():
-            kept = "finished points are kept, and the same command goes on with them"
-            if isinstance(error, CannotWriteError):
-                raise CannotWriteError(f"{error}; {kept}") from error
-            error.left = kept
-        raise
+        with lastly(kept):
+            yield
+    except CannotWriteError as error:
+        raise CannotWriteError("; ".join(filter(None, (str(error), kept())))) from error
 
 
 def _compute(

@@ -25,6 +25,7 @@ from brakecli.errors import BrakecliError, CannotWriteError, RefusedError, value
 from brakecli.faces import argument
 from brakecli.files.atomic import explained, open_own
 from brakecli.files.field import flat
+from brakecli.files.os_signals import lastly
 from brakecli.files.toml_lines import parse
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import Status, record_type, unsound
@@ -212,11 +213,13 @@ def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
         journal = Journal(path, file, plan)
         with explained(path):
             journal.begin(force=force)
-        try:
-            yield journal
-        finally:
+
+        def close() -> None:
             if not journal.finished.any():
                 journal.discard()
+
+        with lastly(close):
+            yield journal
 
 
 def _checksum(place: tuple[int, int, int], packed: bytes) -> int:

@@ -1,21 +1,25 @@
 """What a terminal of 80 columns shows, what long work says without one, and the starters."""
 
+import os
+import pty
 import re
+import signal
+import subprocess
 import sys
 import time
 import tomllib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from brakecli.case.read import parse_case, starters
-from brakecli.cli import output
 from brakecli.front import progress
 from brakecli.front.tables import grid, verdict_table
 from brakecli.scattering.study import parse_study
 from brakecli.sweeps.plan import parse_sweep
-from tests.commands import ROOT, attributes, brakecli, each, left_in
+from tests.commands import COMMAND, LONG, ROOT, TINY, attributes, brakecli, each, environment, left_in
 
 
 @pytest.fixture(autouse=True)
@@ -91,15 +95,35 @@ def test_long_work_without_a_terminal_says_a_line_now_and_then(
 ) -> None:
     seconds = iter([0.0, 5.0, 21.0, 30.0, 41.0, 50.0, 99.0, 101.0])
     monkeypatch.setattr(time, "monotonic", lambda: next(seconds, 200.0))
-    with output.progress(False) as tell:
+    with progress.telling(False) as tell:
         for done in range(6):
             tell("steps", 10 * done, 100)
         tell("reference", 0, 0)
     said = ["steps 10 of 100, 21 s", "steps 40 of 100, 50 s", "reference, 101 s"]
     assert capsys.readouterr().err.splitlines() == [f"brakecli: {line}" for line in said]
-    with output.progress(True) as tell:
+    with progress.telling(True) as tell:
         tell("steps", 1, 2)
     assert capsys.readouterr().err == ""
+
+
+def test_a_signal_takes_the_bar_away_and_gives_the_cursor_back(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    terminal, stderr = pty.openpty()
+    line = [*COMMAND, "run", "tiny.toml", *LONG]
+    shown = b""
+    with subprocess.Popen(line, cwd=tmp_path, stderr=stderr, env=environment(TERM="xterm")) as process:
+        os.close(stderr)
+        with suppress(OSError):  # the end of what a terminal shows
+            while more := os.read(terminal, 1 << 16):
+                if b"steps" not in shown and b"steps" in more:
+                    process.send_signal(signal.SIGINT)
+                shown += more
+    os.close(terminal)
+    assert process.returncode == 130
+    hidden, begin, rest = shown.decode().rpartition("\x1b[?25h")
+    assert hidden.rpartition("\x1b[?25l")[1]
+    assert begin
+    assert rest.endswith("\x1b[2Kbrakecli: interrupted; nothing unfinished was left behind\r\n")
 
 
 def test_the_json_of_a_run_holds_all_that_its_file_says_of_the_case_and_the_versions(good: Path) -> None:

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.errors import RefusedError
+from brakecli.files.os_signals import handle_signals
 from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.plan import LoadedSweep, Plan
@@ -104,6 +105,11 @@ def broken(plan: Plan, first: int, count: int) -> bytes:
     """The same, but for the wicked point, for which nothing is prepared."""
     if first <= WICKED < first + count:
         raise ZeroDivisionError("division by zero\nin two lines")
+    return quick(plan, first, count)
+
+
+def padded(padding: bytes, plan: Plan, first: int, count: int) -> bytes:
+    """The same, by a function that is large."""
     return quick(plan, first, count)
 
 
@@ -215,6 +221,12 @@ def stuck(file: str) -> None:
     local(load_sweep(file, None), Path(file).with_suffix(".h5"), deaf)
 
 
+def large(file: str) -> None:
+    """Start a worker that is to get ten megabytes, as a command does."""
+    handle_signals()
+    local(load_sweep(file, None), Path(file).with_suffix(".h5"), partial(padded, bytes(10_000_000)), 1)
+
+
 def memory(file: str, name: str) -> None:
     """Sweep by a function, and print the largest memory of this process and of its workers, in bytes."""
     largest, looked = 0, 0.0
@@ -255,5 +267,5 @@ def on_cluster(file: str, address: str) -> None:
 
 
 if __name__ == "__main__":
-    choices: list[Callable[..., None]] = [stuck, memory, refused, on_cluster]
+    choices: list[Callable[..., None]] = [stuck, large, memory, refused, on_cluster]
     {each.__name__: each for each in choices}[sys.argv[1]](*sys.argv[2:])

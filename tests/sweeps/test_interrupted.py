@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import QUICK, brakecli, ended, left_in, started, wait_until
-from tests.sweeps.helpers import alive, journal_size, workers
+from tests.commands import QUICK, ROOT, brakecli, ended, left_in, started, wait_until
+from tests.sweeps.helpers import PROGRAM, alive, journal_size, workers
 
 
 @pytest.mark.parametrize(
@@ -42,6 +42,22 @@ def test_a_signal_ends_a_sweep_soon_and_in_one_sentence(
     assert done.told(128 + number, f"brakecli: {word}").count("\n") == 1
     assert not any(map(alive, crew))
     assert left_in(here) <= {"tiny.toml", "s.toml", "s.h5.partial"}
+
+
+def test_a_signal_is_heard_while_a_worker_that_starts_slowly_is_waited_for(here: Path) -> None:
+    """It is stopped before it can take the large cases of its sweep, which fill the pipe to it."""
+    with started("large", here / "s.toml", cwd=ROOT, command=PROGRAM) as process:
+        wait_until(lambda: workers(process.pid))
+        (worker,) = workers(process.pid)
+        os.kill(worker, signal.SIGSTOP)
+        time.sleep(1.0)
+        start = time.monotonic()
+        process.send_signal(signal.SIGTERM)
+        done = ended(process)
+        assert time.monotonic() - start < QUICK
+    assert done.told(143) == "brakecli: terminated; nothing unfinished was left behind\n"
+    assert not alive(worker)
+    assert left_in(here) == {"tiny.toml", "s.toml"}  # no point is finished
 
 
 def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: Path) -> None:

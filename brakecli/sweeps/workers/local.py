@@ -5,16 +5,18 @@ import os
 import signal
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from multiprocessing import connection, get_context, parent_process, resource_tracker
 from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnProcess
+from typing import Self
 
 from brakecli.about import ONE_THREAD
 from brakecli.errors import BrakecliError, UsageError
 from brakecli.faces import argument
-from brakecli.files.os_signals import signals_deferred
+from brakecli.files.os_signals import lastly, signals_deferred
+from brakecli.stop import check_signals
 from brakecli.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
 
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
@@ -45,7 +47,9 @@ class CallerEngine(Engine):
     def run(self, next_task: NextTask) -> Iterator[Finished]:
         """Compute until there are no more tasks."""
         while (task := next_task()) is not None:
-            yield attempt(self._compute, task)
+            finished = attempt(self._compute, task)
+            check_signals()
+            yield finished
 
 
 class LocalEngine(Engine):
@@ -60,11 +64,19 @@ class LocalEngine(Engine):
         """Prepare as many workers. Each is started with its first task."""
         self.workers = workers
         self.pool: list[Worker] = []
-        self._compute = compute
+        self._compute, self._ending = compute, ExitStack()
         self._lost: int | None = 0  # workers that ended before any has answered; None once one has
+
+    def __enter__(self) -> Self:
+        """See to it that the workers end with the block."""
+        self._ending.enter_context(lastly(self._kill))
+        return self
 
     def __exit__(self, *error: object) -> None:
         """Kill the workers."""
+        self._ending.close()
+
+    def _kill(self) -> None:
         for worker in self.pool:
             worker.process.kill()
         while self.pool:
@@ -95,7 +107,7 @@ class LocalEngine(Engine):
     def _start(self) -> Worker:
         context = get_context("spawn")  # a forked child would keep our locks and our threads' memory
         ours, theirs = context.Pipe()
-        worker = Worker(context.Process(target=_serve, args=(theirs, self._compute), daemon=True), ours)
+        worker = Worker(context.Process(target=_serve, args=(theirs,), daemon=True), ours)
         try:
             resource_tracker.ensure_running()  # here, as it lets signals through
             with theirs, _starting():
@@ -105,6 +117,9 @@ class LocalEngine(Engine):
             what = f"a worker process cannot be started: {error.strerror or error}"
             remedy = f"finished points are kept, run the same command again with fewer {argument('jobs')}"
             raise BrakecliError(f"{what}; {remedy}") from error
+        # By the pipe, as signals are heard while a large one waits there until the worker has started.
+        with suppress(OSError):
+            worker.pipe.send(self._compute)
         return worker
 
     def _refuse_starts(self, code: int) -> None:
@@ -162,7 +177,7 @@ def _starting() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, mask)
 
 
-def _serve(pipe: Connection, compute: Compute) -> None:
+def _serve(pipe: Connection) -> None:
     """Compute tasks until the parent ends. The parent kills its workers itself, also after Ctrl-C."""
     for number in (*_SIGNALS, signal.SIGIO):
         ends = number in (signal.SIGTERM, signal.SIGIO)
@@ -172,6 +187,7 @@ def _serve(pipe: Connection, compute: Compute) -> None:
     assert parent is not None
     _die_with(parent.sentinel)
     with suppress(EOFError, OSError):
+        compute = pipe.recv()
         while True:
             finished = attempt(compute, pipe.recv())
             pipe.send(finished)
