@@ -9,7 +9,7 @@ from brakecli.front.tables import grid, two_columns
 
 if TYPE_CHECKING:
     from brakecli.branches.answers import Answers
-    from brakecli.branches.explore import Followed
+    from brakecli.branches.told import Followed
 
 
 def branch_table(title: str, found: Answers, units: str) -> str:

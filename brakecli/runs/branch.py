@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from brakecli.branches.answers import Answers
-from brakecli.branches.explore import Explorer, Followed
+from brakecli.branches.explore import Explorer
 from brakecli.branches.line import ALONE, Line
+from brakecli.branches.told import Followed
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_resolved
 from brakecli.errors import UsageError, printable
