@@ -65,8 +65,12 @@ def frame_of(line: Line, per_period: float) -> Frame:
         )
     periods = [(system, period) for _, system in systems if (period := common_period(system)) is not None]
     if not periods:
-        what = f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats"
-        raise _refused(line, ("roughness", "wheel"), what, "choose wavelengths with a short common multiple")
+        raise _refused(
+            line,
+            ("roughness", "wheel"),
+            f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats",
+            "choose wavelengths with a short common multiple",
+        )
     segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
     segments = max(segments, 1)
     steps = max(default_steps(system, period / segments, per_period) for system, period in periods)

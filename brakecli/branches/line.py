@@ -118,8 +118,7 @@ class Line:
         try:
             return Case.model_validate(data)
         except ValidationError as error:
-            problems = [replace(each, source=self.label) for each in wording.problems(error, Case)]
-            raise CaseError(problems) from None
+            raise CaseError([replace(each, source=self.label) for each in wording.problems(error, Case)]) from None
 
     def _system(self, p: float) -> System:
         """The system at p; raises CaseError where the case is not valid."""

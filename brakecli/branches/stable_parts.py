@@ -64,8 +64,7 @@ def _bound(followed: Followed, k: int, way: int) -> Bound:
     assert branch is not None
     point = branch.points[k]
     if not 0 <= k + way < len(branch.points):
-        end = branch.ended[1 if way > 0 else 0]
-        return Bound(point.p, known=end.kind not in CUT)
+        return Bound(point.p, known=branch.ended[1 if way > 0 else 0].kind not in CUT)
     beyond = branch.points[k + way]
     between = [
         special

@@ -148,8 +148,11 @@ class Profile(Table):
         if self.profile is None and self.profile_error is not None:
             yield self.wrong("profile_error", "is only for a profile", "leave it out")
         if self.spectrum and self.phases_deg is not None and len(self.phases_deg) != self.spectrum.terms:
-            what = f"has {tables.entries(self.phases_deg)}, but spectrum.terms is {self.spectrum.terms}"
-            yield self.wrong("phases_deg", what, "give one value for each term, or leave phases_deg out")
+            yield self.wrong(
+                "phases_deg",
+                f"has {tables.entries(self.phases_deg)}, but spectrum.terms is {self.spectrum.terms}",
+                "give one value for each term, or leave phases_deg out",
+            )
 
     @property
     def is_rough(self) -> bool:

@@ -182,8 +182,10 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
         rows.append((name, shown(mode.frequency, "Hz"), f"{growth}, damping ratio {ratio}"))
     yield Table(rows)
     if report.equilibrium is not None and report.belt_speed:
-        words = "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient"
-        yield picture(words, partial(_diagram, advice))
+        yield picture(
+            "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient",
+            partial(_diagram, advice),
+        )
     if advice.advice:
         yield _changes(advice.advice, advice.wanted_margin)
     known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]

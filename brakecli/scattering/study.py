@@ -68,8 +68,9 @@ class Parameter(Table):
             if len(alone) == 1:
                 yield self.wrong(alone[0], "is given alone", f"give {one} and {other} together")
         if not given:
-            remedy = "give low and high, mean and deviation, or tolerance_percent"
-            yield Problem(("low",), MISSING, remedy, instead=_NUMBERS)
+            yield Problem(
+                ("low",), MISSING, "give low and high, mean and deviation, or tolerance_percent", instead=_NUMBERS
+            )
         if self.tolerance_percent is not None and len(given) > 1:
             others = " and ".join(given[:-1])
             yield self.wrong("tolerance_percent", f"is given together with {others}", "keep one of the two")
@@ -138,8 +139,9 @@ class Parameter(Table):
             try:
                 return Parameter.model_validate(data)
             except ValidationError as error:
-                wrong = wording.problems(error, Parameter)
-                raise CaseError([replace(each, path=("tolerance_percent",)) for each in wrong]) from None
+                raise CaseError(
+                    [replace(each, path=("tolerance_percent",)) for each in wording.problems(error, Parameter)]
+                ) from None
         raise CaseError([self.wrong("tolerance_percent", f"is part of nothing: {what}", remedy)])
 
     @cached_property
@@ -227,8 +229,9 @@ class Study(OverCase):
         for index, each in enumerate(self.parameter):
             for text in each.paths:
                 if key_path(text) in taken:
-                    remedy = "let each key path scatter once"
-                    yield Problem(("parameter", index, "key"), "is set twice" + found(text), remedy)
+                    yield Problem(
+                        ("parameter", index, "key"), "is set twice" + found(text), "let each key path scatter once"
+                    )
                 taken.add(key_path(text))
         if self.correlation is not None:
             yield from self._wrong_correlation()
