@@ -89,7 +89,7 @@ def stability(
         loaded = case_of(case, settings)
         from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.field import values_of
-        from brakecli.files.fields import STABILITY, THRESHOLDS
+        from brakecli.files.stability_fields import STABILITY, THRESHOLDS
 
         if vary is None:
             from brakecli.analysis.stability.report import stability

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError, escaped
 from brakecli.faces import argument
-from brakecli.files import fields
+from brakecli.files import fields, stability_fields
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.field import plain_units
 from brakecli.files.read import StoredResult, Variable
@@ -33,10 +33,10 @@ _TABLES = (
     fields.HISTORY,
     fields.POINT,
     fields.CRITICAL,
-    fields.VARIED,
-    fields.MODES,
+    stability_fields.VARIED,
+    stability_fields.MODES,
     fields.ENTRY,
-    fields.BRANCH_POINT,
+    stability_fields.BRANCH_POINT,
 )
 _ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
 _AXES = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from brakecli.analysis.stability.advice import rounded
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.front.render import text_of
 from brakecli.front.tables import Row, grid, two_columns
 

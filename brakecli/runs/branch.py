@@ -16,7 +16,7 @@ from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_resolved
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, integer, values_of
 from brakecli.files.read import open_result
 from brakecli.files.write import ResultFile, new_result

@@ -14,7 +14,7 @@ from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin

@@ -17,9 +17,10 @@ from brakecli.case.read import LoadedCase
 from brakecli.case.roughness import Records
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.atomic import new_output
 from brakecli.files.field import Field, values_of
+from brakecli.files.fields import TEXT
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
 from brakecli.solver.motion import Counted
@@ -101,7 +102,7 @@ def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None
         for field in (*fields.VARIED, *fields.MODES):
             dims, kind = ((axis.name, "mode"), "f8") if field in fields.MODES else ((axis.name,), field.kind)
             column = [entry[field.name] for entry in found.entries]
-            data = [text or "" for text in column] if kind == fields.TEXT else column
+            data = [text or "" for text in column] if kind == TEXT else column
             result.column(replace(field, kind=kind), dims, data)
         result.commit()
 
