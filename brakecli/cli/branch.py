@@ -35,7 +35,7 @@ def command(
     from brakecli.files.atomic import new_output
     from brakecli.files.field import values_of
     from brakecli.files.stability_fields import BRANCH
-    from brakecli.front.branch_table import branch_table
+    from brakecli.front.stability_tables import branch_table
     from brakecli.runs.branch import branch, line_of, start_of, write
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
