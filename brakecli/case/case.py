@@ -104,7 +104,7 @@ class Case(Table):
         rough = [name for name, profile in self.roughness if profile and profile.is_rough]
         values = {"wheel.angular_speeds": self.wheel.angular_speeds, "load.forces": self.load.forces}
         changing = [key for key, each in values.items() if len({*(each or ())}) > 1]
-        rules = (
+        yield from self.broken(
             (
                 step is not None and self.output.sample_interval < step * (1 - 1e-9),
                 "output.sample_interval",
@@ -143,7 +143,6 @@ class Case(Table):
                 "give a number above 0, in s",
             ),
         )
-        yield from (self.wrong(*problem) for broken, *problem in rules if broken)
         if step is None and "sample_interval" not in self.output.model_fields_set:
             # as one that is not given: it follows the case, also where that is changed
             given, found = self.output.model_fields_set, {"sample_interval": self._interval()}

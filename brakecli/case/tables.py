@@ -142,6 +142,10 @@ class Table(BaseModel):
         """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
         return Problem(tuple(key.split(".")), what + found(attrgetter(key)(self)), remedy)
 
+    def broken(self, *rules: tuple[Any, str, str, str]) -> Iterator[Problem]:
+        """Yield a problem for each rule that is broken: whether it is, then the key, what is wrong, what to do."""
+        yield from (self.wrong(*problem) for broken, *problem in rules if broken)
+
     def _fill(self) -> None:
         """Give the keys that were left out their values, where these depend on other keys."""
 

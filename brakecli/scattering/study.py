@@ -71,20 +71,21 @@ class Parameter(Table):
             yield Problem(
                 ("low",), MISSING, "give low and high, mean and deviation, or tolerance_percent", instead=_NUMBERS
             )
-        if self.tolerance_percent is not None and len(given) > 1:
-            others = " and ".join(given[:-1])
-            yield self.wrong("tolerance_percent", f"is given together with {others}", "keep one of the two")
-        if bounded and spread and self.low is not None:
-            yield self.wrong("mean", "is given together with low and high", "keep one of the two")
-        if self.low is not None and self.high is not None and not self.low < self.high:
-            yield self.wrong("high", "is not above low", "give a range")
-        if self.mode is not None:
-            if self.distribution != "triangular" or self.low is None or self.high is None:
-                yield self.wrong("mode", "is only for a triangular distribution with low and high", "leave it out")
-            elif not self.low <= self.mode <= self.high:
-                yield self.wrong("mode", "is not between low and high", "give a value between them")
-        positive = all(value is None or value > 0.0 for value in (self.low, self.mean))
-        sound = self.low is None or self.high is None or self.low < self.high
+        low, high, mode = self.low, self.high, self.mode
+        sound = low is None or high is None or low < high
+        has_mode = self.distribution == "triangular" and low is not None and high is not None
+        beside = mode is not None and low is not None and high is not None and not low <= mode <= high
+        keep, others = "keep one of the two", " and ".join(given[:-1])
+        in_part = self.tolerance_percent is not None and len(given) > 1
+        only = "is only for a triangular distribution with low and high"
+        yield from self.broken(
+            (in_part, "tolerance_percent", f"is given together with {others}", keep),
+            (bounded and spread and low is not None, "mean", "is given together with low and high", keep),
+            (not sound, "high", "is not above low", "give a range"),
+            (mode is not None and not has_mode, "mode", only, "leave it out"),
+            (has_mode and beside, "mode", "is not between low and high", "give a value between them"),
+        )
+        positive = all(value is None or value > 0.0 for value in (low, self.mean))
         cut = not bounded and None not in (self.mean, self.deviation, self.low, self.high)
         if cut and sound and (normal or positive):
             _, first, last, _ = self._law
