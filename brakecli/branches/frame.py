@@ -51,26 +51,12 @@ class Frame:
 
 def frame_of(line: Line, per_period: float) -> Frame:
     """Segments, steps and cells that are enough over the whole range, and steady sliding along it."""
-    systems, failed = list[tuple[int, System]](), None
-    for k in range(PLACES):
-        try:
-            systems.append((k, line.system(k / (PLACES - 1))))
-        except CaseError as error:
-            failed = error
-    if not systems and failed is not None:
-        raise failed
-    if not systems[0][1].steady:
-        raise _refused(
-            line, ("wheel",), "the speed of the wheel or the load changes in time", "give constant ones"
-        )
-    periods = [(system, period) for _, system in systems if (period := common_period(system)) is not None]
+    systems = line.systems(PLACES)
+    periods = [(system, period) for system in systems.values() if (period := common_period(system)) is not None]
     if not periods:
-        raise _refused(
-            line,
-            ("roughness", "wheel"),
-            f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats",
-            "choose wavelengths with a short common multiple",
-        )
+        what = f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats"
+        remedy = "choose wavelengths with a short common multiple"
+        raise CaseError([Wrong(("roughness", "wheel"), what, remedy, source=line.label)])
     segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
     segments = max(segments, 1)
     steps = max(default_steps(system, period / segments, per_period) for system, period in periods)
@@ -79,7 +65,7 @@ def frame_of(line: Line, per_period: float) -> Frame:
     middle = periods[len(periods) // 2][0]
     depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)
     fast = 2.0 * math.pi * middle.natural_frequencies[1]
-    known = {k: rest[:2] for k, system in systems if (rest := resting(system)) is not None}
+    known = {k: rest[:2] for k, system in systems.items() if (rest := resting(system)) is not None}
     places = np.array(sorted(known))
     origins = np.zeros((PLACES, 2))
     for k in range(PLACES if known else 0):
@@ -94,7 +80,3 @@ def resting(system: System) -> Array | None:
     except CaseError:
         return None
     return np.array([found.x, found.y, 0.0, 0.0])
-
-
-def _refused(line: Line, path: tuple[str, ...], what: str, remedy: str) -> CaseError:
-    return CaseError([Wrong(path, what, remedy, source=line.label)])
