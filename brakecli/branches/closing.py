@@ -16,6 +16,8 @@ SHARP = 0.7
 """Cosine of the angle by which a branch turns at a sharp corner."""
 SAME_PLACE = 1e-7
 """Distance at which two points are one; corrections end at about 1e-12."""
+BRACKETED = 1e-7
+"""Length of a bracket of the crossing that is narrow enough."""
 CARRIED = 1e-4
 """The same where a point is carried to another chart by the problem, before it is corrected."""
 LEAST_SLOPE = 1e-3
@@ -85,7 +87,7 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
         middle = newton.between(one, other, min(max(low / (low - high), 0.02), 0.98) if low != high else 0.5)
         if middle is None or middle.word != here.word:
             return None, None
-        if ahead(middle) == 0.0 or other.s - one.s < 1e-7:
+        if ahead(middle) == 0.0 or other.s - one.s < BRACKETED:
             one = middle
             break
         one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)

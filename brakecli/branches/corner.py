@@ -8,6 +8,11 @@ import numpy as np
 from brakecli.branches.newton import Newton
 from brakecli.branches.point import Point
 
+REACHES = 1e-5, 1e-4, 1e-3, 5e-3
+"""Distances beyond a border at which the other side is looked at."""
+FAR = 5.0
+"""Times the length of a stride beyond a border, from which on a point belongs to another branch."""
+
 
 def beyond_corner(newton: Newton, here: Point) -> Point | None:
     """Go on beyond a border at which the branch turns sharply.
@@ -15,7 +20,7 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
     Just beyond the border the tangent of the other side is the null vector of the derivatives. Only one of its
     two directions stays on the other side.
     """
-    for reach in (1e-5, 1e-4, 1e-3, 5e-3):
+    for reach in REACHES:
         place = here.z + reach * here.tangent
         for _ in range(2):  # the second time, from a place on the tangent of the other side
             seen = newton.evaluate(place, True)
@@ -37,7 +42,7 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
                     chord = new.z - here.z
                     distance = math.sqrt(chord @ chord)
                     new.s = here.s + distance
-                    led = led_on(newton, here, new, length) if distance < 5.0 * length + reach else None
+                    led = led_on(newton, here, new, length) if distance < FAR * length + reach else None
                     if led is not None:
                         return led
             place = here.z + reach * onward

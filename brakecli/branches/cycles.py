@@ -34,6 +34,8 @@ GROWN = 2.0
 """Change of size after which a new chart is taken."""
 SHIFT = 1e-6
 """Length along the branch by which a point is moved to carry its direction to another chart."""
+INSTANT = 1e-12
+"""Part of the period that a flow takes at least: it has no step of no length."""
 SHORTEST, LONGEST = 1e-3, 400.0
 """Periods of a chart between which a period is sought."""
 
@@ -258,18 +260,18 @@ class Cycles(Problem):
         assert isinstance(cycle, Orbit)
         state, best = np.array(cycle.state), (math.inf, 0.0)
         for part in np.linspace(0.0, 1.0, 257)[:-1]:
-            if flow(state, max(part, 1e-12) * cycle.period, False) != DONE:
+            if flow(state, max(part, INSTANT) * cycle.period, False) != DONE:
                 return None
             off = (flow.state - rest) / chart.scales - chart.place
             best = min(best, (float(off @ off), float(part)))
         ahead = best[1] * cycle.period
         for _ in range(8):  # Newton's method for the time at which the plane is passed
-            if flow(state, max(ahead % cycle.period, 1e-12 * cycle.period), False) != DONE:
+            if flow(state, max(ahead % cycle.period, INSTANT * cycle.period), False) != DONE:
                 return None
             off, speed = (flow.state - rest) / chart.scales - chart.place, flow.path.velocity / chart.scales
             ahead -= float(chart.normal @ off) / float(chart.normal @ speed)
         ahead %= cycle.period
-        if flow(state, max(ahead, 1e-12 * cycle.period), False) != DONE:
+        if flow(state, max(ahead, INSTANT * cycle.period), False) != DONE:
             return None
         u = np.append((flow.state - rest) / chart.scales, cycle.period / chart.time)
         old = point.chart

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
@@ -20,6 +20,33 @@ Stop = Callable[[], bool]
 """Called before each stride; True ends the branch with the points found so far."""
 
 RUNS_AGAIN = End("lost", "it is lost: it runs along itself again")
+
+
+@dataclass(frozen=True)
+class Strides:
+    """How long a stride becomes, by the turn and the change in the one before, over those that are aimed at."""
+
+    straightest: float = 0.1  # part that counts at least, so that none is 0; `longest` bounds what follows from it
+    longest: float = 2.0  # factor from one stride to the next, at most
+    shortest: float = 0.3  # and at least, where it is not halved because Newton's method fails
+    aim: float = 0.9  # part of the turn that is aimed at, so that few strides are repeated
+    repeated: float = 2.0  # times the turn that is aimed at, from which on a stride is repeated
+    aim_again: float = 0.8  # what is aimed at then
+    at_border: float = 0.5  # the same of a stride that ends beyond a border, whose sharp turn is not seen
+    fine: float = 30.0  # shortest strides below which one is repeated only for turns that are `repeated` as well
+    large: float = 0.2  # part of a large coefficient by which changes of it are counted
+
+
+STRIDES = Strides()
+LEFT, ROUNDING = 0.5, 1e-7
+"""Part of a stride by which a point may lie off its guess, beyond which it is of another branch; and rounding."""
+VERTICAL = 1e-9
+"""Slope dp/ds below which a tangent is vertical."""
+
+
+def _left(off: Array, length: float) -> bool:
+    """Whether a point so far off its guess has left the branch in a stride of this length."""
+    return math.sqrt(off @ off) > LEFT * length + ROUNDING
 
 
 def follow(
@@ -59,7 +86,7 @@ def both_ways(
 
 def _directed(first: Point, sign: float) -> Point:
     slope = first.tangent[-1]
-    upward = slope > 0.0 or abs(slope) < 1e-9
+    upward = slope > 0.0 or abs(slope) < VERTICAL
     return replace(first if upward == (sign > 0.0) else first.turned(), s=0.0)
 
 
@@ -168,8 +195,7 @@ class _Walk:
             return None if newton.outside is None else self._end_point(here, newton.outside)
         if not settings.low <= new.p <= settings.high:
             return self._end_point(here, new.z)
-        off = new.z - guess
-        if math.sqrt(off @ off) > 0.5 * stride + 1e-7:
+        if _left(new.z - guess, stride):
             newton.why = "Newton's method leaves the branch"
             return None
         self._placed(here, new)
@@ -215,9 +241,8 @@ class _Walk:
         new = self.newton.at_parameter(guess, bound, here.tangent, 0.0, exact=True)
         if new is None or not self._at_bound(new):
             return None
-        off, chord = new.z - guess, new.z - here.z
-        way = math.sqrt(chord @ chord)
-        if math.sqrt(off @ off) > 0.5 * way + 1e-7 or not float(chord @ here.tangent) > 0.0:
+        chord = new.z - here.z
+        if _left(new.z - guess, math.sqrt(chord @ chord)) or not float(chord @ here.tangent) > 0.0:
             return None
         return self._placed(here, new)
 
@@ -244,16 +269,18 @@ class _Walk:
         angle = math.acos(cosine) / settings.turn
         # Very large coefficients belong to a motion that stays unstable whatever they do.
         change = max(
-            abs(a - b) / max(1.0, 0.2 * min(abs(a), abs(b)))
+            abs(a - b) / max(1.0, STRIDES.large * min(abs(a), abs(b)))
             for a, b in zip(here.coefficients, new.coefficients, strict=True)
         )
-        ratio = max(angle, change / settings.change, 0.1)
+        ratio = max(angle, change / settings.change, STRIDES.straightest)
         if here.word == new.word:
-            if ratio > 2.0 and (stride > 30.0 * settings.shortest or angle > 2.0):
-                return max(0.3, 0.8 / ratio) * stride, 0.0
-        elif stride > settings.border and ratio > 0.5:
-            return 0.3 * stride, 0.0
-        return 0.0, min(settings.longest, stride * min(2.0, max(0.3, 0.9 / ratio)))
+            long, repeated = stride > STRIDES.fine * settings.shortest, STRIDES.repeated
+            if ratio > repeated and (long or angle > repeated):
+                return max(STRIDES.shortest, STRIDES.aim_again / ratio) * stride, 0.0
+        elif stride > settings.border and ratio > STRIDES.at_border:
+            return STRIDES.shortest * stride, 0.0
+        factor = min(STRIDES.longest, max(STRIDES.shortest, STRIDES.aim / ratio))
+        return 0.0, min(settings.longest, stride * factor)
 
     def _renewed(self, point: Point) -> Point | None:
         """The point in a new chart, where the problem wants one and the motion is found in it."""
