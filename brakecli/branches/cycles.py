@@ -212,8 +212,6 @@ class Cycles(Problem):
     def renewed(self, point: Point) -> Guess | None:
         """A chart of the present size, with its anchor far from events, where either has become necessary."""
         cycle, chart = point.facts, point.chart
-        assert isinstance(cycle, Orbit)
-        assert isinstance(chart, Chart)
         times = cycle.times or (cycle.period,)
         near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
         grown = cycle.amplitude / chart.size
@@ -253,11 +251,9 @@ class Cycles(Problem):
             state = flow.state
         return np.append((state - self.rest(p)) / scales, z[4] * chart.time / time)
 
-    def carried(self, point: Point, chart: object) -> Guess | None:
+    def carried(self, point: Point, chart: Chart) -> Guess | None:
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
-        assert isinstance(chart, Chart)
         cycle, flow, rest = point.facts, self.flow(point.p), self.rest(point.p)
-        assert isinstance(cycle, Orbit)
         state, best = np.array(cycle.state), (math.inf, 0.0)
         for part in np.linspace(0.0, 1.0, 257)[:-1]:
             if flow(state, max(part, INSTANT) * cycle.period, False) != DONE:
@@ -274,9 +270,7 @@ class Cycles(Problem):
         if flow(state, max(ahead, INSTANT * cycle.period), False) != DONE:
             return None
         u = np.append((flow.state - rest) / chart.scales, cycle.period / chart.time)
-        old = point.chart
-        assert isinstance(old, Chart)
-        beside = self._moved(point.z + SHIFT * point.tangent, old, ahead, chart.scales, chart.time)
+        beside = self._moved(point.z + SHIFT * point.tangent, point.chart, ahead, chart.scales, chart.time)
         if beside is None:
             return None
         direction = np.append((beside - u) / SHIFT, point.tangent[5])
@@ -284,10 +278,8 @@ class Cycles(Problem):
         direction[:4] -= speed * (chart.normal @ direction[:4]) / (chart.normal @ speed)
         return u, direction
 
-    def border(self, before: object, after: object) -> str:
+    def border(self, before: Any, after: Any) -> str:
         """What one of two sequences of phases has more of: stick, or flight."""
-        assert isinstance(before, tuple)
-        assert isinstance(after, tuple)
         changes = [(after.count(phase) - before.count(phase), phase) for phase in (STICK, OPEN)]
         if changes[1][0]:
             return "grazing flight"
@@ -295,10 +287,8 @@ class Cycles(Problem):
 
     def doubled(self, point: Point, vector: Array) -> Guess:
         """The motion of twice the period, displaced along the eigenvector of -1."""
-        chart = point.chart
-        assert isinstance(chart, Chart)
-        self.chart = replace(chart, time=2.0 * chart.time)
-        return point.u, np.append(chart.basis @ vector, [0.0, 0.0])
+        self.chart = replace(point.chart, time=2.0 * point.chart.time)
+        return point.u, np.append(point.chart.basis @ vector, [0.0, 0.0])
 
 
 def _longest_slip(cycle: Orbit) -> float | None:

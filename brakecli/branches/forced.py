@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -185,10 +185,8 @@ class Forced(Doubled):
                 return np.asarray(((beside.ends - found.ends) / step).ravel())
         return None
 
-    def border(self, before: object, after: object) -> str:
+    def border(self, before: Any, after: Any) -> str:
         """What one of two sequences of phases has more of. Lift-off is no border, as the force is continuous."""
-        assert isinstance(before, tuple)
-        assert isinstance(after, tuple)
         return "sequence of events changes" if before.count(STICK) == after.count(STICK) else "grazing stick"
 
     def doubled(self, point: Point, vector: Array) -> Guess:

@@ -148,35 +148,27 @@ class Parameter(Table):
     @cached_property
     def _law(self) -> tuple[Any, float, float, bool]:
         """The distribution, the probabilities below both ends of what is kept of it, or, if so, above them."""
-        low, high, mean, deviation = self.low, self.high, self.mean, self.deviation
-        if self.distribution in ("uniform", "triangular"):
-            if low is None or high is None:
-                assert mean is not None
-                assert deviation is not None
-                half = deviation * math.sqrt(3.0 if self.distribution == "uniform" else 6.0)
+        low, high, mean, deviation = (getattr(self, name) for name in _NUMBERS[:4])
+        uniform, normal = (self.distribution == name for name in ("uniform", "normal"))
+        bounded, whole = uniform or self.distribution == "triangular", None in (low, high, mean, deviation)
+        if bounded:
+            if low is None:
+                half = deviation * math.sqrt(3.0 if uniform else 6.0)
                 low, high = mean - half, mean + half
             width, mode = high - low, 0.5 * (low + high) if self.mode is None else self.mode
-            if self.distribution == "uniform":
-                return stats.uniform(low, width), 0.0, 1.0, False
-            return stats.triang((mode - low) / width, low, width), 0.0, 1.0, False
-        normal = self.distribution == "normal"
-        if mean is None or deviation is None:
-            assert low is not None
-            assert high is not None
+            law = stats.uniform(low, width) if uniform else stats.triang((mode - low) / width, low, width)
+        elif mean is None:
             ends = (low, high) if normal else (math.log(low), math.log(high))
             middle, spread = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / (2.0 * _LIMIT)
             law = stats.norm(middle, spread) if normal else stats.lognorm(spread, scale=math.exp(middle))
-            return law, 0.0, 1.0, False
-        if normal:
+        elif normal:
             law = stats.norm(mean, deviation)
         else:
             spread = math.sqrt(math.log1p((deviation / mean) ** 2))
             law = stats.lognorm(spread, scale=mean * math.exp(-0.5 * spread**2))
-        if low is None or high is None:
+        if bounded or whole:
             return law, 0.0, 1.0, False
-        above = bool(
-            low > law.median()
-        )  # there probabilities above are exact, and those below are 1 but for rounding
+        above = bool(low > law.median())  # probabilities above are exact there; those below are 1 but for rounding
         ends = (law.sf(low), law.sf(high)) if above else (law.cdf(low), law.cdf(high))
         return law, float(ends[0]), float(ends[1]), above
 
