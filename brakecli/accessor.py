@@ -21,8 +21,9 @@ from brakecli.analysis.stability.report import Discrete
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.as_xarray import stored
-from brakecli.files.contents import Difference
+from brakecli.files.contents import DIFFERENCE_OF_TWO, Difference
 from brakecli.files.field import values_of
+from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER, STABILITY, THRESHOLDS
 from brakecli.front.file_tables import diff_table
 from brakecli.front.render import TERMINAL
 from brakecli.front.stability_tables import advice_table
@@ -43,7 +44,7 @@ _APART = {
     "warnings",
     "indices_of",
 }
-_KINDS = fields.STABILITY, fields.THRESHOLDS, fields.LOCK_IN, fields.BRANCH, fields.SCATTER, fields.SWEEP
+_KINDS = STABILITY, THRESHOLDS, LOCK_IN, BRANCH, SCATTER, fields.SWEEP
 _TOLD = {each.name: each for kind in _KINDS for each in kind if each.name not in _APART}
 """What a table says of a result that is no verdict."""
 
@@ -87,7 +88,7 @@ class Differences(Difference, Shown):
 
     def table(self) -> str:
         """The table of the command."""
-        return diff_table({"a": "a", "b": "b", "output": ""}, values_of(fields.DIFFERENCE_OF_TWO, self))
+        return diff_table({"a": "a", "b": "b", "output": ""}, values_of(DIFFERENCE_OF_TWO, self))
 
 
 @xr.register_dataset_accessor("brakecli")

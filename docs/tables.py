@@ -1,9 +1,9 @@
 """The tables of the documentation that the program declares: `make tables`.
 
 What a result holds stands between `<!-- fields NAME … -->` and `<!-- end of fields -->`, where each NAME is one of
-brakecli/files/fields.py. The rows by which a verdict is found stand between `<!-- rows NAME -->` and
-`<!-- end of rows -->`, where NAME is one of brakecli/analysis/regime/table.py. Their second column, where a row
-holds, is written by hand; a new row has a `?` there.
+`fields`, `stability_fields` and `contents` in brakecli/files/. The rows by which a verdict is found stand between
+`<!-- rows NAME -->` and `<!-- end of rows -->`, with a NAME of brakecli/analysis/regime/table.py. Their second
+column, where a row holds, is written by hand; a new row has a `?` there.
 
 With --check nothing is written: the exit code is 1 where a page does not agree with the program, or has a `?`.
 """
@@ -13,19 +13,20 @@ import sys
 from pathlib import Path
 
 from brakecli.analysis.regime import table as verdicts
-from brakecli.files import fields
+from brakecli.files import contents, fields, stability_fields
 
 PLACE = re.compile(r"(<!-- fields ([A-Z_ ]+) -->\n).*?(<!-- end of fields -->)", re.DOTALL)
 ROWS = re.compile(r"(<!-- rows ([A-Z]+) -->\n)(.*?)(<!-- end of rows -->)", re.DOTALL)
 CELLS = re.compile(r"^\| ([^|]+) \| ([^|]+) \|", re.MULTILINE)
 UNKNOWN = "?"
+KNOWN = vars(contents) | vars(stability_fields) | vars(fields)
 PAGES = ("result-format", "results", "regimes", "sweeps", "accuracy", "stability", "branches", "scatter")
 
 
 def table(names: str) -> str:
     """The rows of one or more declarations."""
     lines = ["", "| name | unit | meaning |", "|---|---|---|"]
-    for row in (row for name in names.split() for row in getattr(fields, name)):
+    for row in (row for name in names.split() for row in KNOWN[name]):
         meaning = row.meaning if row.in_file else f"{row.meaning} (JSON only)"
         lines.append(f"| `{row.name}` | {row.units} | {meaning} |".replace("|  |", "| |"))
     return "\n".join([*lines, "", ""])

@@ -13,7 +13,7 @@ from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.comparison.compare import compare
 from brakecli.comparison.result import ComparisonReport, write
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.field import values_of
 from brakecli.files.read import open_result
 from brakecli.runs.run import run

@@ -3,36 +3,22 @@
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import combinations, groupby, pairwise
-from typing import NamedTuple
+from itertools import combinations
 
 import numpy as np
 
-from brakecli.branches.bar import WIDEST, Bound, located
-from brakecli.branches.explore import FORCED, SLIDING, Explored, Followed, Mark, crossing, span
+from brakecli.branches.bar import Bound
+from brakecli.branches.explore import Explored, crossing, span
 from brakecli.branches.follow import RUNS_AGAIN
 from brakecli.branches.line import Line
-from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import End, Point
 from brakecli.branches.sliding import Slide
+from brakecli.branches.stable_parts import CUT, NARROWEST, Part, Span, merged, stable_parts, told_apart, united
+from brakecli.branches.told import FORCED, SLIDING, Followed, Mark
 
-NARROWEST = 1e-6
-"""Part of the range below which an interval is that of rounding."""
 MEET = 1e-3
 """Part of the range, and of their states, by which two ends of branches differ at most that are one motion."""
-Span = tuple[float, float]
-"""Two places of the line, the lower one first."""
 NONE_BEGINS = "no vibration begins in the range; --start follows one that a run has come to"
-CUT = {"lost", "points", "seconds", "interrupted", "start"}
-"""Ends of a branch beyond which the motion goes on, unknown."""
-
-
-class Part(NamedTuple):
-    """A stable part of one or more branches, and its frequency (Hz) at the lower end."""
-
-    low: Bound
-    high: Bound
-    frequency: float
 
 
 @dataclass(frozen=True)
@@ -76,7 +62,7 @@ class Answers:
     def known(self) -> list[Span]:
         """Where the motion is known that continues steady sliding."""
         if self.bases:
-            return _merged([*map(span, self.bases), *self._bridges])
+            return merged([*map(span, self.bases), *self._bridges])
         slides = self._slides
         return [(slides[0].p, slides[-1].p)] if slides else []
 
@@ -157,7 +143,7 @@ class Answers:
     def _stable(self) -> list[Part]:
         """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
         if self.bases:
-            return _united([part for each in self.bases for part in self._stable_parts(each)])
+            return united([part for each in self.bases for part in stable_parts(each)])
         found, slides = list[Part](), self._slides
         if not slides:
             return found
@@ -188,70 +174,12 @@ class Answers:
         for followed in self.branches:
             if followed.kind == SLIDING or followed in self.bases:
                 continue
-            for part in self._stable_parts(followed):
+            for part in stable_parts(followed):
                 for begin, end in self.stable_spans:
                     left, right = max(part.low.p, begin), min(part.high.p, end)
                     if right > left + NARROWEST:
                         found.append((left, right, part.frequency))
         return sorted(found)
-
-    def _stable_parts(self, followed: Followed) -> list[Part]:
-        """The stable parts of a branch, each up to the special point behind its last motion."""
-        found = list[Part]()
-        branch = followed.branch
-        points = branch.points if branch else []
-        for stable, group in groupby(range(len(points)), lambda k: points[k].stable):
-            if not stable:
-                continue
-            places = [*group]
-            ends = [self._bound(followed, places[0], -1), self._bound(followed, places[-1], 1)]
-            part = [points[k] for k in places]
-            low, high = (
-                min([*ends, *self._turns(followed, places, way)], key=lambda bound: way * bound.p)
-                for way in (1, -1)
-            )
-            special = [each.point for each in branch.specials if each.p == low.p] if branch else []
-            lowest = special[0] if special else min(part, key=lambda point: point.p)
-            found.append(Part(low, high, lowest.facts.frequency))
-        return found
-
-    def _turns(self, followed: Followed, places: list[int], way: int) -> list[Bound]:
-        """The inner point of a stable part that lies furthest in p, where one does: folds that rounding makes.
-
-        Finer steps make other ones. What they move is seen at the nearest motion that is not stable.
-        """
-        points = followed.branch.points if followed.branch else []
-        furthest = min(places, key=lambda k: way * points[k].p)
-        if furthest in (places[0], places[-1]):
-            return []
-        inner = points[furthest]
-        others = [k for k, point in enumerate(points) if not point.stable and point.chart is inner.chart]
-        beyond = points[min(others, key=lambda k: abs(k - furthest))] if others else None
-        return [Bound(inner.p, abs(points[furthest - 1].p - inner.p), inner, beyond, followed.problem)]
-
-    def _bound(self, followed: Followed, k: int, way: int) -> Bound:
-        """Where the stable part ends whose last point that way is the one at k."""
-        branch, problem = followed.branch, followed.problem
-        assert branch is not None
-        point = branch.points[k]
-        if not 0 <= k + way < len(branch.points):
-            end = branch.ended[1 if way > 0 else 0]
-            return Bound(point.p, known=end.kind not in CUT)
-        beyond = branch.points[k + way]
-        between = [
-            special
-            for special in branch.specials
-            if special.kind != "end" and 0.0 <= way * (special.s - point.s) <= way * (beyond.s - point.s)
-        ]
-        if not between:
-            p = 0.5 * (point.p + beyond.p)
-            if point.chart is beyond.chart:
-                problem.use(point.chart)
-                pair = (point, beyond) if way > 0 else (beyond, point)
-                p = located(Newton(problem, Settings()), *pair)
-            return Bound(p, 0.0, point, beyond, problem)
-        special = min(between, key=lambda each: abs(each.s - point.s))
-        return Bound(special.p, special.error, point, beyond, problem)
 
     @property
     def coexists_from(self) -> float | None:
@@ -328,36 +256,6 @@ class Answers:
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
         what = "the motion that the waves force" if self.bases else "stable sliding"
         return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]
-
-
-def told_apart(bounds: list[Bound]) -> list[Bound]:
-    """The bounds in order, with their bars, without pairs that are closer than these, of which one is wide.
-
-    An interval that is so narrow may be none; so may what lies between two.
-    """
-    bounds = [bound._replace(error=bound.bar, inner=None) for bound in bounds]
-    for k, (one, other) in enumerate(pairwise(bounds)):
-        bars = one.error, other.error
-        if one.known and other.known and max(bars) >= WIDEST and other.p - one.p < min(bars):
-            return told_apart([*bounds[:k], *bounds[k + 2 :]])
-    return bounds
-
-
-def _merged(spans: list[Span]) -> list[Span]:
-    """The union of spans, in order."""
-    return [(part.low.p, part.high.p) for part in _united([Part(Bound(a), Bound(b), 0.0) for a, b in spans])]
-
-
-def _united(parts: list[Part]) -> list[Part]:
-    """The union of parts, in order."""
-    found = list[Part]()
-    for part in sorted(parts, key=lambda part: part.low.p):
-        if found and part.low.p <= found[-1].high.p + NARROWEST:
-            if part.high.p > found[-1].high.p:
-                found[-1] = found[-1]._replace(high=part.high)
-        else:
-            found.append(part)
-    return found
 
 
 def metres(length: float) -> str:

@@ -32,6 +32,10 @@ RETURNS = 0.25
 """Distance, in sizes of the motion, of a state from an earlier one that may be the same."""
 TRIES = 12
 """Pairs of states from which Newton's method is begun."""
+CLEAR = 0.05
+"""Part of the wheel's speed by which a first state has to slide: one that sticks is no place of a section."""
+WHOLE = 0.3
+"""Part of the size that was seen which a cycle has at least: a smaller one is another."""
 AT_REST = 1e-3
 """Size of a motion, over the compression of the pad, below which it has died out."""
 
@@ -128,7 +132,7 @@ def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Poi
     omega = 2.0 * math.pi * frequency
     scales, x = size * np.array([1.0, 1.0, omega, omega]), 0.5 * float(np.ptp(seen[:, 0]))
     belt = problem.line.shoe(p).belt
-    places = [k for k in range(LOOKS) if abs(seen[k, 2] - belt) > 0.05 * abs(belt)]
+    places = [k for k in range(LOOKS) if abs(seen[k, 2] - belt) > CLEAR * abs(belt)]
     tries = 0
     for k in places[:: max(len(places) // 4, 1)]:
         away = np.abs((seen - seen[k]) / scales).max(axis=1)
@@ -139,6 +143,6 @@ def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Poi
             if tries > TRIES:
                 return None
             point = _started(problem, p, seen[k], (j - k) / LOOKS * period, scales, period, x)
-            if point is not None and point.facts.amplitude > 0.3 * x:
+            if point is not None and point.facts.amplitude > WHOLE * x:
                 return point
     return None

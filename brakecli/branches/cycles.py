@@ -34,6 +34,8 @@ GROWN = 2.0
 """Change of size after which a new chart is taken."""
 SHIFT = 1e-6
 """Length along the branch by which a point is moved to carry its direction to another chart."""
+INSTANT = 1e-12
+"""Part of the period that a flow takes at least: it has no step of no length."""
 SHORTEST, LONGEST = 1e-3, 400.0
 """Periods of a chart between which a period is sought."""
 
@@ -210,8 +212,6 @@ class Cycles(Problem):
     def renewed(self, point: Point) -> Guess | None:
         """A chart of the present size, with its anchor far from events, where either has become necessary."""
         cycle, chart = point.facts, point.chart
-        assert isinstance(cycle, Orbit)
-        assert isinstance(chart, Chart)
         times = cycle.times or (cycle.period,)
         near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
         grown = cycle.amplitude / chart.size
@@ -251,30 +251,26 @@ class Cycles(Problem):
             state = flow.state
         return np.append((state - self.rest(p)) / scales, z[4] * chart.time / time)
 
-    def carried(self, point: Point, chart: object) -> Guess | None:
+    def carried(self, point: Point, chart: Chart) -> Guess | None:
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
-        assert isinstance(chart, Chart)
         cycle, flow, rest = point.facts, self.flow(point.p), self.rest(point.p)
-        assert isinstance(cycle, Orbit)
         state, best = np.array(cycle.state), (math.inf, 0.0)
         for part in np.linspace(0.0, 1.0, 257)[:-1]:
-            if flow(state, max(part, 1e-12) * cycle.period, False) != DONE:
+            if flow(state, max(part, INSTANT) * cycle.period, False) != DONE:
                 return None
             off = (flow.state - rest) / chart.scales - chart.place
             best = min(best, (float(off @ off), float(part)))
         ahead = best[1] * cycle.period
         for _ in range(8):  # Newton's method for the time at which the plane is passed
-            if flow(state, max(ahead % cycle.period, 1e-12 * cycle.period), False) != DONE:
+            if flow(state, max(ahead % cycle.period, INSTANT * cycle.period), False) != DONE:
                 return None
             off, speed = (flow.state - rest) / chart.scales - chart.place, flow.path.velocity / chart.scales
             ahead -= float(chart.normal @ off) / float(chart.normal @ speed)
         ahead %= cycle.period
-        if flow(state, max(ahead, 1e-12 * cycle.period), False) != DONE:
+        if flow(state, max(ahead, INSTANT * cycle.period), False) != DONE:
             return None
         u = np.append((flow.state - rest) / chart.scales, cycle.period / chart.time)
-        old = point.chart
-        assert isinstance(old, Chart)
-        beside = self._moved(point.z + SHIFT * point.tangent, old, ahead, chart.scales, chart.time)
+        beside = self._moved(point.z + SHIFT * point.tangent, point.chart, ahead, chart.scales, chart.time)
         if beside is None:
             return None
         direction = np.append((beside - u) / SHIFT, point.tangent[5])
@@ -282,10 +278,8 @@ class Cycles(Problem):
         direction[:4] -= speed * (chart.normal @ direction[:4]) / (chart.normal @ speed)
         return u, direction
 
-    def border(self, before: object, after: object) -> str:
+    def border(self, before: Any, after: Any) -> str:
         """What one of two sequences of phases has more of: stick, or flight."""
-        assert isinstance(before, tuple)
-        assert isinstance(after, tuple)
         changes = [(after.count(phase) - before.count(phase), phase) for phase in (STICK, OPEN)]
         if changes[1][0]:
             return "grazing flight"
@@ -293,10 +287,8 @@ class Cycles(Problem):
 
     def doubled(self, point: Point, vector: Array) -> Guess:
         """The motion of twice the period, displaced along the eigenvector of -1."""
-        chart = point.chart
-        assert isinstance(chart, Chart)
-        self.chart = replace(chart, time=2.0 * chart.time)
-        return point.u, np.append(chart.basis @ vector, [0.0, 0.0])
+        self.chart = replace(point.chart, time=2.0 * point.chart.time)
+        return point.u, np.append(point.chart.basis @ vector, [0.0, 0.0])
 
 
 def _longest_slip(cycle: Orbit) -> float | None:

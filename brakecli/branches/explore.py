@@ -17,14 +17,14 @@ from brakecli.branches.follow import Stop, both_ways, follow
 from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
-from brakecli.branches.point import Branch, End, Point, Special
+from brakecli.branches.point import Point
 from brakecli.branches.problem import Problem
 from brakecli.branches.rough_cycles import RoughCycles
 from brakecli.branches.sliding import Change, Slide, Sliding
 from brakecli.branches.switch import switch
+from brakecli.branches.told import FORCED, IN_SLIDING, LIMIT_CYCLE, Followed, Mark, slid, told_of
 from brakecli.errors import CaseError
 
-SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
 SMALLEST = 0.5
 """Amplitude over that at the begin below which a cycle of a rough shoe ends in steady sliding."""
 LARGEST = 1e4
@@ -39,51 +39,8 @@ GROWN_AT = 0.0, 1.0, 0.5, 0.25, 0.75
 """Places of the line at which a forced motion is sought that grows with the waves, where none is known yet."""
 SAME = 1e-6
 """Relative difference of amplitude and period by which two motions at one value are the same."""
-IN_SLIDING = "it ends in steady sliding, where that flutters"
 LARGE = "its amplitude is ten thousand times that of its begin"
 UNDAMPED = "no dashpot damps the shoe: all multipliers stay on the unit circle, so that no limit cycle is followed"
-
-
-@dataclass(frozen=True, slots=True)
-class Row:
-    """A motion on a branch, as files and `--json` give it (SI units)."""
-
-    value: float
-    amplitude: float
-    frequency: float
-    stick_fraction: float
-    contact_loss_fraction: float
-    stable: bool
-    multipliers: tuple[complex, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Mark:
-    """A special point of a branch; error in the unit of the value, and why, where the branch ends."""
-
-    kind: str
-    value: float
-    error: float
-    amplitude: float
-    frequency: float
-    reason: str = ""
-
-
-@dataclass(frozen=True)
-class Followed:
-    """A branch, its motions in order, and what is special on it."""
-
-    kind: str
-    points: list[Row]
-    special: list[Mark]
-    branch: Branch | None = None
-    problem: Any = None
-    note: str = ""
-
-    @property
-    def ended(self) -> list[Mark]:
-        """Why it ends, at either end."""
-        return [mark for mark in self.special if mark.kind in ("end", "budget")]
 
 
 @dataclass(frozen=True)
@@ -122,7 +79,9 @@ class Explorer:
 
     def explore(self, states: Sequence[tuple[float, Any]] = (), switches: bool = False) -> Explored:
         """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted."""
-        self.branches.append(self._sliding(self.slides, self.changes))
+        self.branches.append(slid(self.line, self.slides, self.changes))
+        if not self.branches[0].points:
+            self.notes.append("there is no steady sliding in the range")
         if self.line.case.roughness.wheel is not None:
             self._forced()
         else:
@@ -136,8 +95,7 @@ class Explorer:
     @property
     def explored(self) -> Explored:
         """What has been found so far."""
-        found = [*self.branches], [*self.notes]
-        return Explored(self.line, self.slides, self.changes, *found, bool(self.stop()))
+        return Explored(self.line, self.slides, self.changes, [*self.branches], [*self.notes], bool(self.stop()))
 
     def begin_at(self, p: float, state: Any) -> None:
         """Follow the branch of the motion that a state at a place comes to, if it is not known."""
@@ -147,31 +105,21 @@ class Explorer:
         elif self.waves is not None:
             self._forced_from(self.waves, p, state)
 
-    def _sliding(self, slides: list[Slide], changes: list[Change]) -> Followed:
-        """Steady sliding: its multipliers are those of a period of its least stable mode, or of a second."""
-        rows, marks = [], []
-        there = [slide for slide in slides if slide.eigenvalues is not None]
-        for slide in there:
-            assert slide.eigenvalues is not None
-            fastest = slide.eigenvalues[int(np.argmax(slide.eigenvalues.real))]
-            frequency = abs(float(fastest.imag)) / (2.0 * math.pi)
-            factors = np.exp(np.clip((slide.eigenvalues / (frequency or 1.0)).real, -700.0, 700.0)) * np.exp(
-                1j * (slide.eigenvalues / (frequency or 1.0)).imag
-            )
-            rows.append(
-                Row(self.line.value(slide.p), 0.0, frequency, 0.0, 0.0, slide.stable, tuple(factors.tolist()))
-            )
-        for change in changes:
-            width = abs(self.line.high - self.line.low)
-            marks.append(Mark(change.kind, self.line.value(change.p), change.error * width, 0.0, change.frequency))
-        if there:
-            for slide, end in ((there[0], "lower"), (there[-1], "upper")):
-                whole = slide.p == (0.0 if end == "lower" else 1.0)
-                why = f"it reaches the {end} end of the range" if whole else "there is no steady sliding beyond"
-                marks.append(Mark("end", self.line.value(slide.p), 0.0, 0.0, 0.0, why))
-        else:
-            self.notes.append("there is no steady sliding in the range")
-        return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.value))
+    def _follow(
+        self,
+        problem: Any,
+        first: Point,
+        kind: str = LIMIT_CYCLE,
+        note: str = "",
+        *,
+        within: bool = False,
+        change: Change | None = None,
+        changes: Sequence[Change] = (),
+    ) -> None:
+        """Follow the branch of a motion along its tangent, or both ways if it lies `within` it."""
+        how = self._settings(), self._until(problem, first), self.stop
+        branch = both_ways(problem, first, *how) if within else follow(problem, first, None, *how)
+        self.branches.append(replace(told_of(self.line, branch, problem, kind, change, changes), note=note))
 
     def _settings(self) -> Settings:
         left = max(self.end - perf_counter(), 0.0)
@@ -212,8 +160,7 @@ class Explorer:
             if first is None:
                 self.notes.append(f"no limit cycle was found at the flutter at {value:.6g}")
                 continue
-            branch = follow(problem, first, None, self._settings(), self._until(problem, first), self.stop)
-            self.branches.append(self._followed(branch, problem, change, changes))
+            self._follow(problem, first, change=change, changes=changes)
 
     @cached_property
     def waves(self) -> Forced | None:
@@ -234,8 +181,7 @@ class Explorer:
                 continue
             first = problem.begun(p, replace(self._settings(), points=300))
             if first is not None:
-                branch = both_ways(problem, first, self._settings(), self._until(problem, first), self.stop)
-                self.branches.append(self._followed(branch, problem, kind=FORCED))
+                self._follow(problem, first, FORCED, within=True)
         if len(self.branches) == 1:
             self.notes.append("no motion was found that the waves force")
 
@@ -248,9 +194,7 @@ class Explorer:
         elif self._known(p, found[1]):
             self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
         else:
-            branch = both_ways(*found, self._settings(), self._until(*found), self.stop)
-            note = f"from the motion given for {value:.6g}"
-            self.branches.append(replace(self._followed(branch, found[0], kind=FORCED), note=note))
+            self._follow(*found, FORCED, f"from the motion given for {value:.6g}", within=True)
 
     def _known(self, p: float, first: Point) -> bool:
         """Whether a motion at p lies on a branch that has been followed, perhaps as several of its periods."""
@@ -266,10 +210,10 @@ class Explorer:
     def _from_state(self, sliding: Sliding, p: float, state: Any) -> None:
         """The branch of the cycle that a motion comes to; none where it is known already."""
         values = sliding.at(p).eigenvalues
-        frequency = 0.0 if values is None else float(np.abs(values.imag).max()) / (2.0 * math.pi)
+        frequency = 0.0
         if values is not None:
-            least_stable = values[int(np.argmax(values.real))]
-            frequency = abs(float(least_stable.imag)) / (2.0 * math.pi) or frequency
+            least_stable = abs(float(values[int(np.argmax(values.real))].imag))
+            frequency = (least_stable or float(np.abs(values.imag).max())) / (2.0 * math.pi)
         value, problem = self.line.value(p), self._problem()
         first = settled(problem, p, state, frequency) if frequency else None
         if first is None:
@@ -278,9 +222,7 @@ class Explorer:
         if self._known(p, first):
             self.notes.append(f"the motion given for {value:.6g} comes to a cycle of a branch from flutter")
             return
-        branch = both_ways(problem, first, self._settings(), self._until(problem, first), self.stop)
-        note = f"from the motion given for {value:.6g}"
-        self.branches.append(replace(self._followed(branch, problem), note=note))
+        self._follow(problem, first, note=f"from the motion given for {value:.6g}", within=True)
 
     def _problem(self) -> Cycles:
         return Cycles(self.line) if self.line.smooth else RoughCycles(self.line)
@@ -294,77 +236,17 @@ class Explorer:
 
     def _doubled(self) -> None:
         """The motions of twice the period that are born at flips."""
-        for followed in list(self.branches):
-            for special in followed.branch.specials if followed.branch is not None else ():
+        for origin in list(self.branches):
+            for special in origin.branch.specials if origin.branch is not None else ():
                 if special.kind != "flip" or self._over():
                     continue
-                problem = followed.problem.of_periods(2 * followed.problem.periods)
+                problem = origin.problem.of_periods(2 * origin.problem.periods)
                 first = switch(problem, special.point, self._settings())
                 value = self.line.value(special.p)
                 if first is None:
                     self.notes.append(f"no motion of twice the period was found at the flip at {value:.6g}")
                     continue
-                branch = follow(problem, first, None, self._settings(), self._until(problem, first), self.stop)
-                note = f"twice the period, from the flip at {value:.6g}"
-                self.branches.append(replace(self._followed(branch, problem, kind=followed.kind), note=note))
-
-    def _followed(
-        self,
-        branch: Branch,
-        problem: Any,
-        change: Change | None = None,
-        changes: Sequence[Change] = (),
-        kind: str = LIMIT_CYCLE,
-    ) -> Followed:
-        """A branch as rows and marks; of the linear vibrations at its flutter only the largest one is kept."""
-        points, specials = branch.points, branch.specials
-        marks = []
-        if change is not None and not self.line.smooth:
-            specials = [special for special in specials if special.s > 0.0 or special.kind == "end"]
-            marks.append(self._mark(Special("flutter", change.p, change.error, points[0], points[0].s)))
-        elif change is not None:
-            begin = next((k for k, point in enumerate(points) if len(set(point.facts.word)) > 1), len(points))
-            begin = max(begin - 1, 0)
-            points = points[begin:]
-            specials = [special for special in specials if special.s > points[0].s + 1e-5 or special.kind == "end"]
-            marks.append(self._mark(Special("flutter", change.p, change.error, points[0], points[0].s)))
-        for special in specials:
-            if special.kind == "end" and special.name == IN_SLIDING and changes:
-                near = min(changes, key=lambda each: abs(each.p - special.p))
-                marks.append(self._mark(Special("flutter", near.p, near.error, special.point, special.s)))
-            else:
-                marks.append(self._mark(special, branch.ended))
-        rows = [self._row(point) for point in points]
-        return Followed(kind, rows, marks, replace(branch, points=points), problem)
-
-    def _row(self, point: Point) -> Row:
-        cycle = point.facts
-        return Row(
-            self.line.value(point.p),
-            cycle.amplitude,
-            cycle.frequency,
-            cycle.stick_fraction,
-            cycle.contact_loss_fraction,
-            point.stable,
-            tuple(point.multipliers.tolist()),
-        )
-
-    def _mark(self, special: Special, ended: Sequence[End] = ()) -> Mark:
-        kind = special.name if special.kind == "grazing" else special.kind
-        if kind.startswith("sequence"):
-            kind = "grazing stick"
-        cut = [
-            end for end in ended if end.reason == special.name and end.kind in ("points", "seconds", "interrupted")
-        ]
-        facts, width = special.point.facts, abs(self.line.high - self.line.low)
-        return Mark(
-            "budget" if special.kind == "end" and cut else kind,
-            self.line.value(special.p),
-            special.error * width,
-            facts.amplitude,
-            facts.frequency,
-            special.name if special.kind == "end" else "",
-        )
+                self._follow(problem, first, origin.kind, f"twice the period, from the flip at {value:.6g}")
 
 
 def span(followed: Followed) -> tuple[float, float]:

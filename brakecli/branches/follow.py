@@ -2,11 +2,13 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 import numpy as np
 
+from brakecli.branches.closing import LEAST_LOOP, SHARP, TURNED_BACK, closing, passed, turned_back
+from brakecli.branches.corner import beyond_corner, led_on
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Branch, End, Point, Special
 from brakecli.branches.problem import Array, Problem
@@ -17,22 +19,34 @@ Until = Callable[[Point], str | None]
 Stop = Callable[[], bool]
 """Called before each stride; True ends the branch with the points found so far."""
 
-LEAST_LOOP = 8
-"""A closed branch turns by 2π, so it has more points than this: each stride turns by at most 0.7 rad."""
-RECENT = 20
-"""Points among which one is sought over which the branch runs back."""
-TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
 RUNS_AGAIN = End("lost", "it is lost: it runs along itself again")
-SHARP = 0.7
-"""Cosine of the angle by which a branch turns at a sharp corner."""
-SAME_PLACE = 1e-7
-"""Distance at which two points are one; corrections end at about 1e-12."""
-CARRIED = 1e-4
-"""The same where a point is carried to another chart by the problem, before it is corrected."""
-LEAST_SLOPE = 1e-3
-"""Slope dp/ds at the first point from which on p says where a branch in another chart passes it."""
-SAME_WAY = 0.999
-"""Cosine of the angle between their tangents."""
+
+
+@dataclass(frozen=True)
+class Strides:
+    """How long a stride becomes, by the turn and the change in the one before, over those that are aimed at."""
+
+    straightest: float = 0.1  # part that counts at least, so that none is 0; `longest` bounds what follows from it
+    longest: float = 2.0  # factor from one stride to the next, at most
+    shortest: float = 0.3  # and at least, where it is not halved because Newton's method fails
+    aim: float = 0.9  # part of the turn that is aimed at, so that few strides are repeated
+    repeated: float = 2.0  # times the turn that is aimed at, from which on a stride is repeated
+    aim_again: float = 0.8  # what is aimed at then
+    at_border: float = 0.5  # the same of a stride that ends beyond a border, whose sharp turn is not seen
+    fine: float = 30.0  # shortest strides below which one is repeated only for turns that are `repeated` as well
+    large: float = 0.2  # part of a large coefficient by which changes of it are counted
+
+
+STRIDES = Strides()
+LEFT, ROUNDING = 0.5, 1e-7
+"""Part of a stride by which a point may lie off its guess, beyond which it is of another branch; and rounding."""
+VERTICAL = 1e-9
+"""Slope dp/ds below which a tangent is vertical."""
+
+
+def _left(off: Array, length: float) -> bool:
+    """Whether a point so far off its guess has left the branch in a stride of this length."""
+    return math.sqrt(off @ off) > LEFT * length + ROUNDING
 
 
 def follow(
@@ -49,8 +63,7 @@ def follow(
     first point. Where the first tangent is vertical, 1 means along it and -1 against it.
     """
     walk = _Walk(problem, settings or Settings(), until, stop)
-    direction = first if sign is None else _directed(first, sign)
-    points, end = walk.followed(direction)
+    points, end = walk.followed(first if sign is None else _directed(first, sign))
     return _finished(walk, points, (End("start", "the branch was begun here"), end))
 
 
@@ -73,9 +86,8 @@ def both_ways(
 
 def _directed(first: Point, sign: float) -> Point:
     slope = first.tangent[-1]
-    upward = slope > 0.0 or abs(slope) < 1e-9
-    directed = first if upward == (sign > 0.0) else first.turned()
-    return replace(directed, s=0.0)
+    upward = slope > 0.0 or abs(slope) < VERTICAL
+    return replace(first if upward == (sign > 0.0) else first.turned(), s=0.0)
 
 
 def _finished(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branch:
@@ -112,8 +124,7 @@ class _Walk:
         if self._at_bound(first):
             return points, self._range_end(first.p)
         while True:
-            end = self.over()
-            if end is not None:
+            if (end := self.over()) is not None:
                 return points, end
             if self.count >= settings.points:
                 return points, End("points", f"the budget of {settings.points} points is spent")
@@ -126,7 +137,7 @@ class _Walk:
                 # a corner is tried as soon as the border is near, and at last in any case
                 if stride >= settings.shortest and not (beyond and stride < settings.border <= before):
                     continue
-                new = self._corner(here)
+                new = beyond_corner(self.newton, here)
                 if new is None:
                     if stride >= settings.shortest:
                         continue
@@ -138,29 +149,25 @@ class _Walk:
                     stride = shorter
                     continue
                 stride = longer
-            turning = self._beyond_turn(here, new)
-            if turning is not None:
-                new = turning
-            if self._turned_back(points, new):
+            new = self._beyond_turn(here, new) or new
+            if turned_back(points, new, settings.border):
                 return points, TURNED_BACK
             points.append(new)
             self.count += 1
-            reason = self.until(new) if self.until is not None else None
-            if reason:
+            if self.until is not None and (reason := self.until(new)):
                 return points, End("stopped", reason)
             if self._at_bound(new):
                 return points, self._range_end(new.p)
             if len(points) > LEAST_LOOP:
-                closing, end = self._closing(first, here, new)
+                last, end = closing(self.newton, first, here, new)
                 if end is not None:
-                    points[-1:] = [closing] if closing is not None else []
+                    points[-1:] = [last] if last is not None else []
                     return points, end
                 self.problem.use(new.chart)
-                if any(self._closing(passed, here, new)[0] for passed in self._passed(points)):
+                if any(closing(self.newton, earlier, here, new)[0] for earlier in passed(points)):
                     return points, RUNS_AGAIN
                 self.problem.use(new.chart)
-            renewed = self._renewed(new)
-            if renewed is not None:
+            if (renewed := self._renewed(new)) is not None:
                 points.append(renewed)
 
     def _range_end(self, p: float) -> End:
@@ -172,9 +179,8 @@ class _Walk:
 
     def _lost(self, here: Point) -> End:
         seen = self.newton.seen
-        where = ""
-        if seen is not None and seen.word != here.word:
-            where = f" at a border: {self.problem.border(here.word, seen.word)}"
+        crossed = seen is not None and seen.word != here.word
+        where = f" at a border: {self.problem.border(here.word, seen.word)}" if crossed and seen else ""
         return End("lost", f"it is lost{where} ({self.newton.why})")
 
     def _step(self, points: list[Point], stride: float) -> Point | None:
@@ -189,8 +195,7 @@ class _Walk:
             return None if newton.outside is None else self._end_point(here, newton.outside)
         if not settings.low <= new.p <= settings.high:
             return self._end_point(here, new.z)
-        off = new.z - guess
-        if math.sqrt(off @ off) > 0.5 * stride + 1e-7:
+        if _left(new.z - guess, stride):
             newton.why = "Newton's method leaves the branch"
             return None
         self._placed(here, new)
@@ -199,7 +204,7 @@ class _Walk:
             return None
         if new.word != here.word and float(new.tangent @ here.tangent) < SHARP:
             # at a sharp corner the last tangent does not say which way the branch goes on
-            return self._led_on(here, new, stride) or new
+            return led_on(newton, here, new, stride) or new
         return new
 
     @staticmethod
@@ -236,9 +241,8 @@ class _Walk:
         new = self.newton.at_parameter(guess, bound, here.tangent, 0.0, exact=True)
         if new is None or not self._at_bound(new):
             return None
-        off, chord = new.z - guess, new.z - here.z
-        way = math.sqrt(chord @ chord)
-        if math.sqrt(off @ off) > 0.5 * way + 1e-7 or not float(chord @ here.tangent) > 0.0:
+        chord = new.z - here.z
+        if _left(new.z - guess, math.sqrt(chord @ chord)) or not float(chord @ here.tangent) > 0.0:
             return None
         return self._placed(here, new)
 
@@ -265,95 +269,18 @@ class _Walk:
         angle = math.acos(cosine) / settings.turn
         # Very large coefficients belong to a motion that stays unstable whatever they do.
         change = max(
-            abs(a - b) / max(1.0, 0.2 * min(abs(a), abs(b)))
+            abs(a - b) / max(1.0, STRIDES.large * min(abs(a), abs(b)))
             for a, b in zip(here.coefficients, new.coefficients, strict=True)
         )
-        ratio = max(angle, change / settings.change, 0.1)
+        ratio = max(angle, change / settings.change, STRIDES.straightest)
         if here.word == new.word:
-            if ratio > 2.0 and (stride > 30.0 * settings.shortest or angle > 2.0):
-                return max(0.3, 0.8 / ratio) * stride, 0.0
-        elif stride > settings.border and ratio > 0.5:
-            return 0.3 * stride, 0.0
-        return 0.0, min(settings.longest, stride * min(2.0, max(0.3, 0.9 / ratio)))
-
-    def _corner(self, here: Point) -> Point | None:
-        """Go on beyond a border at which the branch turns sharply.
-
-        Just beyond the border the tangent of the other side is the null vector of the derivatives. Only one of its
-        two directions stays on the other side.
-        """
-        newton = self.newton
-        for reach in (1e-5, 1e-4, 1e-3, 5e-3):
-            place = here.z + reach * here.tangent
-            for _ in range(2):  # the second time, from a place on the tangent of the other side
-                seen = newton.evaluate(place, True)
-                if seen is None or seen.by_p is None or seen.word == here.word:
-                    break
-                rows = np.column_stack([seen.by_u, seen.by_p])
-                if not np.isfinite(rows).all():
-                    break
-                onward = np.linalg.svd(rows)[2][-1]
-                for length in (0.1 * reach, reach, 10.0 * reach):
-                    for way in (onward, -onward):
-                        # Newton's method begins beyond the border: from this side it would find this side again
-                        guess = place + (length - (place - here.z) @ way) * way
-                        new = newton.solved(guess, way, way, 0.0)
-                        if new is None or new.word != seen.word:
-                            new = newton.solved(here.z + length * way, way, way, 0.0)
-                        if new is None or new.word != seen.word or not newton.holds(new):
-                            continue
-                        chord = new.z - here.z
-                        distance = math.sqrt(chord @ chord)
-                        new.s = here.s + distance
-                        led = self._led_on(here, new, length) if distance < 5.0 * length + reach else None
-                        if led is not None:
-                            return led
-                place = here.z + reach * onward
-            newton.seen = seen
-        return None
-
-    def _led_on(self, here: Point, new: Point, length: float) -> Point | None:
-        """A point just beyond a border, with its tangent away from the border; None if neither way leads on."""
-        one = new.z - here.z
-        for point in (new, replace(new.turned(), s=new.s)):
-            guess = point.z + length * point.tangent
-            further = self.newton.solved(guess, point.tangent, point.tangent, 0.0)
-            if further is not None and further.word == new.word and self.newton.holds(further):
-                other = further.z - here.z
-                if float(other @ other) > float(one @ one):
-                    return point
-        return None
-
-    def _turned_back(self, points: list[Point], new: Point) -> bool:
-        """Whether the branch has come back across a border and runs back over itself."""
-        if new.word == points[-1].word:
-            return False
-        reach = 10.0 * self.settings.border
-        for point in points[: -1 - RECENT : -1]:
-            if point.chart is new.chart and point.word == new.word:
-                chord = new.z - point.z
-                return bool(math.sqrt(chord @ chord) < reach and new.tangent @ point.tangent < -SAME_WAY)
-        return False
-
-    @staticmethod
-    def _passed(points: list[Point]) -> list[Point]:
-        """The earlier point, if any, that the last stride passes on its way along the same stretch of the branch.
-
-        Newton's method may go over to another branch where two cross. Then a closed one is entered, and its first
-        point is not that of the walk.
-        """
-        here, new = points[-2:]
-        way = new.s - here.s
-        beside = [
-            point
-            for point in points[1:-LEAST_LOOP]
-            if abs(point.p - new.p) <= way
-            and point.chart is new.chart
-            and point.word == new.word
-            and float(point.tangent @ new.tangent) > SHARP
-            and float(np.abs(point.z - new.z).max()) <= way
-        ]
-        return beside[-1:]
+            long, repeated = stride > STRIDES.fine * settings.shortest, STRIDES.repeated
+            if ratio > repeated and (long or angle > repeated):
+                return max(STRIDES.shortest, STRIDES.aim_again / ratio) * stride, 0.0
+        elif stride > settings.border and ratio > STRIDES.at_border:
+            return STRIDES.shortest * stride, 0.0
+        factor = min(STRIDES.longest, max(STRIDES.shortest, STRIDES.aim / ratio))
+        return 0.0, min(settings.longest, stride * factor)
 
     def _renewed(self, point: Point) -> Point | None:
         """The point in a new chart, where the problem wants one and the motion is found in it."""
@@ -367,61 +294,3 @@ class _Walk:
             self.problem.use(point.chart)
             return None
         return new
-
-    def _closing(self, first: Point, here: Point, new: Point) -> tuple[Point | None, End | None]:
-        """The last point and the end of a branch that has come back to its first point; None where it has not.
-
-        Where a stride crosses the plane across the first tangent, the crossing is bracketed on this branch until
-        no other one can be mistaken for it, and then compared with the first point: place and direction.
-        """
-        if here.chart is not new.chart or here.word != new.word or here is first:
-            return None, None
-        foreign = new.chart is not first.chart
-        if foreign and abs(first.tangent[-1]) < LEAST_SLOPE:
-            return None, None  # the parameter alone does not say where it passes the first point
-
-        def ahead(point: Point) -> float:
-            if foreign:
-                return float((point.z[-1] - first.z[-1]) * first.tangent[-1])
-            return float((point.z - first.z) @ first.tangent)
-
-        if ahead(here) * ahead(new) > 0.0:
-            return None, None
-        if not foreign:
-            away = here.z - first.z
-            if math.sqrt(away @ away) > 4.0 * (new.s - here.s):
-                return None, None
-        one, other = here, new
-        for _ in range(7):
-            low, high = ahead(one), ahead(other)
-            middle = self.newton.between(
-                one, other, min(max(low / (low - high), 0.02), 0.98) if low != high else 0.5
-            )
-            if middle is None or middle.word != here.word:
-                return None, None
-            if ahead(middle) == 0.0 or other.s - one.s < 1e-7:
-                one = middle
-                break
-            one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)
-        nearest = min((one, other), key=lambda point: abs(ahead(point)))
-        place, onward, chart = nearest.z, nearest.tangent, new.chart
-        if foreign:
-            guess = self.problem.carried(nearest, first.chart)
-            if guess is None:
-                return None, None
-            place, onward, chart = np.append(guess[0], nearest.p), guess[1], first.chart
-        self.problem.use(chart)
-        place = place - first.tangent * ((place - first.z) @ first.tangent)
-        crossing = self.newton.solved(place, first.tangent, onward, nearest.s, exact=True)
-        if crossing is None or crossing.word != first.word:
-            return None, None
-        if float(np.abs(crossing.z - place).max()) > (CARRIED if foreign else SAME_PLACE):
-            return None, None
-        if float(np.abs(crossing.z - first.z).max()) > SAME_PLACE:
-            return None, None
-        cosine = float(crossing.tangent @ first.tangent)
-        if cosine > SAME_WAY:
-            return crossing, End("closed", "it is closed: it comes back to its first point")
-        if cosine < -SAME_WAY:
-            return None, TURNED_BACK
-        return None, None

@@ -9,40 +9,33 @@ as the sequence of phases is the same.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from brakecli.branches.cycles import cyclic
 from brakecli.branches.follow import follow
+from brakecli.branches.frame import NO_PERIOD, Frame, frame_of, resting
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Settings, start
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Doubled, Guess, Problem, Seen
 from brakecli.errors import CaseError
-from brakecli.errors import Problem as Wrong
 from brakecli.solver.automaton import STICK
 from brakecli.solver.flow.repeating import Orbit
-from brakecli.solver.flow.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status, default_cells, default_steps
-from brakecli.solver.period import LONGEST, common_period
+from brakecli.solver.flow.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status
+from brakecli.solver.period import common_period
 from brakecli.solver.roughness import surface
-from brakecli.solver.steady_sliding import steady_sliding, tabulated
 from brakecli.solver.system import System
 
 DIFFERENCE = 1e-6
 """Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so they are
 exact to about 1e-6, as is the direction of a branch."""
-SLOW_PERIODS = 10.0
-"""Periods of the slowest mode in a segment: disturbances stay far above rounding and below the bound of a run."""
-PLACES = 33
-"""Places of the range at which periods, frequencies and steady sliding are looked at."""
 SNAP = 1e-6
 """Difference from the wheel's velocity, in the unit of velocities, below which a segment begins with just that.
 A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
-LEAST_STEPS = 100
-"""Steps of a common period, which are cheap: the more, the smoother are kinks of the force at edges of contact."""
 FIRST_WAVES = 1e-3
 """Part of the amplitude of the waves with which a motion begins that grows with them."""
 WAITED = 50
@@ -61,33 +54,6 @@ REASONS = {
 }
 GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=20.0, insertions=0)
 """How a motion is followed as the waves grow. Its multipliers do not matter on the way."""
-NO_PERIOD = "the waves of the wheel have no common period"
-
-
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """How motions are computed and counted, the same over the whole range."""
-
-    segments: int  # of a common period
-    steps: int  # of a segment
-    cells: int  # of the pad
-    scales: Array  # units of x, y, v_x and v_y
-    origins: Array  # (places, 2), x and y of steady sliding at equal distances in p
-
-    def origin(self, p: float) -> Array:
-        """The state from which states count: steady sliding, between the places by cubics with equal slopes."""
-        xy = self.origins
-        last = len(xy) - 1
-        if last == 0:
-            return np.append(xy[0], [0.0, 0.0])
-        k = min(max(int(p * last), 0), last - 1)
-        t = p * last - k
-        here, there = xy[k], xy[k + 1]
-        begin = 0.5 * (there - xy[k - 1]) if k > 0 else there - here
-        end = 0.5 * (xy[k + 2] - here) if k + 2 <= last else there - here
-        chord = there - here
-        cubic = here + t * chord + t * (1.0 - t) * ((1.0 - t) * (begin - chord) - t * (end - chord))
-        return np.append(cubic, [0.0, 0.0])
 
 
 class _Flown(NamedTuple):
@@ -115,7 +81,7 @@ class Forced(Doubled):
         Raises CaseError where no place is valid, where speed or load change, and where the waves have no common
         period.
         """
-        return cls(line.system, _frame(line, per_period), periods)
+        return cls(line.system, frame_of(line, per_period), periods)
 
     def of_periods(self, periods: int) -> "Forced":
         """The problem of motions that repeat after so many common periods, with the same steps and cells."""
@@ -219,10 +185,8 @@ class Forced(Doubled):
                 return np.asarray(((beside.ends - found.ends) / step).ravel())
         return None
 
-    def border(self, before: object, after: object) -> str:
+    def border(self, before: Any, after: Any) -> str:
         """What one of two sequences of phases has more of. Lift-off is no border, as the force is continuous."""
-        assert isinstance(before, tuple)
-        assert isinstance(after, tuple)
         return "sequence of events changes" if before.count(STICK) == after.count(STICK) else "grazing stick"
 
     def doubled(self, point: Point, vector: Array) -> Guess:
@@ -259,7 +223,7 @@ class Forced(Doubled):
 
         here = replace(self.frame, origins=self.frame.origin(p)[None, :2])
         problem = Forced(with_waves, here, self.periods)
-        smooth = _resting(replace(system, wheel=surface()))
+        smooth = resting(replace(system, wheel=surface()))
         if smooth is None:
             return None
         u = np.tile((smooth - here.origin(0.0)) / here.scales, self.segments)
@@ -323,50 +287,3 @@ class Forced(Doubled):
         length = period / frame.segments
         run = flow(origin + u * frame.scales, k * length, length, frame.steps, False)
         return (run.state - origin) / frame.scales if run.status is Status.DONE else None
-
-
-def _resting(system: System) -> Array | None:
-    """Steady sliding as a state; None where there is none."""
-    try:
-        found = steady_sliding(system, mean=tabulated(system))
-    except CaseError:
-        return None
-    return np.array([found.x, found.y, 0.0, 0.0])
-
-
-def _frame(line: Line, per_period: float) -> Frame:
-    """Segments, steps and cells that are enough over the whole range, and steady sliding along it."""
-    systems, failed = list[tuple[int, System]](), None
-    for k in range(PLACES):
-        try:
-            systems.append((k, line.system(k / (PLACES - 1))))
-        except CaseError as error:
-            failed = error
-    if not systems and failed is not None:
-        raise failed
-    if not systems[0][1].steady:
-        raise _refused(
-            line, ("wheel",), "the speed of the wheel or the load changes in time", "give constant ones"
-        )
-    periods = [(system, period) for _, system in systems if (period := common_period(system)) is not None]
-    if not periods:
-        what = f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats"
-        raise _refused(line, ("roughness", "wheel"), what, "choose wavelengths with a short common multiple")
-    segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
-    segments = max(segments, 1)
-    steps = max(default_steps(system, period / segments, per_period) for system, period in periods)
-    steps = max(steps, math.ceil(LEAST_STEPS / segments))
-    cells = max(default_cells(system) for system, _ in periods)
-    middle = periods[len(periods) // 2][0]
-    depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)
-    fast = 2.0 * math.pi * middle.natural_frequencies[1]
-    known = {k: rest[:2] for k, system in systems if (rest := _resting(system)) is not None}
-    places = np.array(sorted(known))
-    origins = np.zeros((PLACES, 2))
-    for k in range(PLACES if known else 0):
-        origins[k] = known[int(places[np.argmin(np.abs(places - k))])]
-    return Frame(segments, steps, cells, depth * np.array([1.0, 1.0, fast, fast]), origins)
-
-
-def _refused(line: Line, path: tuple[str, ...], what: str, remedy: str) -> CaseError:
-    return CaseError([Wrong(path, what, remedy, source=line.label)])

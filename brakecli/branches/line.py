@@ -14,7 +14,7 @@ from brakecli.case import wording
 from brakecli.case.case import Case
 from brakecli.case.read import key_path, put
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError
+from brakecli.errors import CaseError, Problem
 from brakecli.solver.compile import Floats
 from brakecli.solver.records import Coefficients
 from brakecli.solver.system import System
@@ -118,8 +118,25 @@ class Line:
         try:
             return Case.model_validate(data)
         except ValidationError as error:
-            problems = [replace(each, source=self.label) for each in wording.problems(error, Case)]
-            raise CaseError(problems) from None
+            raise CaseError([replace(each, source=self.label) for each in wording.problems(error, Case)]) from None
+
+    def systems(self, places: int) -> dict[int, System]:
+        """The systems at equally distant places, by their numbers, where the case is valid.
+
+        Raises CaseError where it is nowhere valid, and where speed or load change.
+        """
+        found, failed = dict[int, System](), None
+        for k in range(places):
+            try:
+                found[k] = self.system(k / (places - 1))
+            except CaseError as error:
+                failed = error
+        if not found and failed is not None:
+            raise failed
+        if not all(system.steady for system in found.values()):
+            what = "the speed of the wheel or the load changes in time"
+            raise CaseError([Problem(("wheel",), what, "give constant ones", source=self.label)])
+        return found
 
     def _system(self, p: float) -> System:
         """The system at p; raises CaseError where the case is not valid."""

@@ -121,11 +121,7 @@ class Newton:
             last = gap
             matrix[:n, :n], matrix[:n, n] = seen.by_u, by_p
             right[:n, 0], right[n, 0] = -seen.gap, normal @ (guess - z)
-            solution = self._solution(matrix, right)
-            if solution is None:
-                break
-            step, tangent = solution[:, 0], solution[:, 1]
-            length = math.sqrt(tangent @ tangent)
+            step, tangent, length = self._solution(matrix, right)
             size = float(np.abs(step).max())
             if not size <= settings.trust or not length < math.inf:
                 break
@@ -146,21 +142,21 @@ class Newton:
                 if seen is None:
                     return None
                 matrix[:n, n] = seen.by_p
-                solution = self._solution(matrix, right)
-                if solution is None:
+                step, tangent, length = self._solution(matrix, right)
+                if not length < math.inf:
                     break
-                step, tangent = solution[:, 0], solution[:, 1]
-                length = math.sqrt(tangent @ tangent)
             return self._point(z + step, tangent / length, length, matrix, onward, s, seen)
         self.why = "Newton's method does not converge"
         return None
 
     @staticmethod
-    def _solution(matrix: Array, right: Array) -> Array | None:
+    def _solution(matrix: Array, right: Array) -> tuple[Array, Array, float]:
+        """The correction, a tangent and its length, which is infinite where there is none."""
         try:
-            return np.asarray(np.linalg.solve(matrix, right), dtype=np.float64)
+            step, tangent = np.linalg.solve(matrix, right).T
         except np.linalg.LinAlgError:
-            return None
+            return right[:, 0], right[:, 1], math.inf
+        return step, tangent, math.sqrt(tangent @ tangent)
 
     def _point(
         self, z: Array, tangent: Array, length: float, matrix: Array, onward: Array, s: float, seen: Seen

@@ -31,7 +31,7 @@ class Point:
     """Sign, and logarithm of the modulus, of the determinant of the derivatives bordered by the tangent."""
     word: Hashable
     facts: Any
-    chart: object
+    chart: Any  # how the problem reads the unknowns
     maps: Array
     margins: tuple[float, ...]
 

@@ -45,7 +45,7 @@ Guess = tuple[Array, Array]
 class Problem(Protocol):
     """What the engine calls. A class that inherits from it need only write `evaluate`."""
 
-    chart: object = None
+    chart: Any = None
     """Scaling, phase condition and the like by which `u` is to be read now. Charts are compared by identity."""
 
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
@@ -55,7 +55,7 @@ class Problem(Protocol):
         """The same motions, computed so many times more finely in one way each; none where they are exact."""
         return []
 
-    def use(self, chart: object) -> None:
+    def use(self, chart: Any) -> None:
         """Return to the chart of a point."""
         self.chart = chart
 
@@ -63,7 +63,7 @@ class Problem(Protocol):
         """Change to a better chart where one is due, and say where the point lies in it. None: the chart stays."""
         return None
 
-    def carried(self, point: "Point", chart: object) -> Guess | None:
+    def carried(self, point: "Point", chart: Any) -> Guess | None:
         """Say where the point lies in another chart. None: it cannot be said. The chart in use does not change."""
         return None
 

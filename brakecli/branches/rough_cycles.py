@@ -6,7 +6,7 @@ continuous.
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from brakecli.branches.line import Line
 from brakecli.branches.problem import Array
 from brakecli.errors import CaseError, Problem
 from brakecli.solver.automaton import BACKWARD, OPEN, STICK
-from brakecli.solver.flow.rough import Flown, RoughFlow, Status, default_cells, default_steps
+from brakecli.solver.flow.rough import RoughFlow, Status, default_cells, default_steps
 from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, LONG
 from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
@@ -48,8 +48,6 @@ class Span:
         """With so many steps to the fastest period."""
         self._flow, self._per_period = flow, per_period
         self._instant = INSTANT / flow.system.natural_frequencies[1]
-        self._run: Flown | None = None
-        self._begin, self._time = np.zeros(4), 0.0
 
     def __call__(self, state: Array, span: float, tangents: bool = True) -> int:
         """Carry a state over a span (s); see `Flow`."""
@@ -62,39 +60,15 @@ class Span:
     def over(self, state: Array, span: float, steps: int, tangents: bool) -> int:
         """The same in so many steps."""
         self._begin, self._time = np.array(state), span
-        self._run = self._flow(self._begin, 0.0, span, steps, tangents)
-        return _ENDS.get(self._run.status, LONG)
-
-    @property
-    def _last(self) -> Flown:
-        assert self._run is not None
-        return self._run
-
-    @property
-    def state(self) -> Array:
-        """See `Flow`."""
-        return self._last.state
-
-    @property
-    def derivative(self) -> Array:
-        """See `Flow`."""
-        assert self._last.derivative is not None
-        return self._last.derivative
-
-    @property
-    def word(self) -> tuple[int, ...]:
-        """See `Flow`."""
-        return self._last.word
-
-    @property
-    def times(self) -> tuple[float, ...]:
-        """See `Flow`."""
-        return self._last.times
+        run = self._run = self._flow(self._begin, 0.0, span, steps, tangents)
+        self.state, self.word, self.times = run.state, run.word, run.times
+        self.derivative: Any = run.derivative  # None where it was not asked for
+        return _ENDS.get(run.status, LONG)
 
     @property
     def path(self) -> Way:
         """See `Flow`."""
-        run, belt = self._last, self._flow.system.belt_speed
+        run, belt = self._run, self._flow.system.belt_speed
         start = self._flow(self._begin, 0.0, self._instant, 1, False).velocity
         spent, least = np.zeros(4), run.margins.slide
         spent[STICK], spent[OPEN] = run.margins.stick_share * self._time, run.margins.open_share * self._time
@@ -111,22 +85,11 @@ class RoughCycles(Cycles):
         Raises CaseError where no place is valid, where the wheel is rough, and where speed or load change.
         """
         super().__init__(line, periods)
-        self.per_period, self.cells, failed = per_period, 0, None
-        for k in range(PLACES):
-            try:
-                system = line.system(k / (PLACES - 1))
-            except CaseError as error:
-                failed = error
-                continue
-            if system.wheel.g.size:
-                wrong = "the wheel is rough, so no motion repeats but those that its waves force"
-                raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
-            if not system.steady:
-                wrong = "the speed of the wheel or the load changes in time"
-                raise CaseError([Problem(("wheel",), wrong, "give constant ones", source=line.label)])
-            self.cells = max(self.cells, default_cells(system))
-        if not self.cells and failed is not None:
-            raise failed
+        systems = line.systems(PLACES).values()
+        if any(system.wheel.g.size for system in systems):
+            wrong = "the wheel is rough, so no motion repeats but those that its waves force"
+            raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
+        self.per_period, self.cells = per_period, max(map(default_cells, systems))
 
     def _flow(self, p: float) -> Flow:
         return Span(RoughFlow(self.line.system(p), self.cells), self.per_period)

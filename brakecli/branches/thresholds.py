@@ -40,8 +40,7 @@ class Thresholds:
         if self.critical is None:
             return None
         locks = ", and the shoe locks there" if self.kind == "divergence" else ""
-        first = f"sliding loses stability at {self.critical:.4g}{locks}"
-        return "; ".join(filter(None, [first, self.beside]))
+        return "; ".join(filter(None, [f"sliding loses stability at {self.critical:.4g}{locks}", self.beside]))
 
 
 def thresholds(

@@ -119,8 +119,16 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
         raise CaseError([*map(explained, error.problems)]) from None
     before, wheel = stored.case.wheel.radius, stored.case.roughness.wheel
     if wheel and wheel.note and loaded.case.wheel.radius != before and loaded.case.roughness.wheel == wheel:
-        what = f"cannot change the sines of a measured profile, made for {before!r} m"
-        raise CaseError([Problem(("wheel", "radius"), what, remedy, source=label)])
+        raise CaseError(
+            [
+                Problem(
+                    ("wheel", "radius"),
+                    f"cannot change the sines of a measured profile, made for {before!r} m",
+                    remedy,
+                    source=label,
+                )
+            ]
+        )
     return loaded
 
 
@@ -174,8 +182,9 @@ def parse_over_case(
         case_text, source = read_text(str(folder / table.case))
     except CaseError as error:
         at = Problem(("case",), "", "", name, lines.get(("case",), 0))
-        wrong = (replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems)
-        raise CaseError([*wrong]) from error
+        raise CaseError(
+            [replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems]
+        ) from error
     return table, parse_case(case_text, source, [each for each in overrides if each not in for_file]), lines
 
 

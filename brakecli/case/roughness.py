@@ -90,10 +90,11 @@ class Spectrum(Table):
     seed: Annotated[int, Field(ge=0, le=2**63 - 1)] = described("seed of the random phases", 0)
 
     def _broken_rules(self) -> Iterator[Problem]:
-        if self.shortest >= self.longest:
-            yield self.wrong("shortest", "is not below longest", "give a range of wavelengths")
-        if self.rms > 0.5 * tables.LARGEST:  # a sine has at most 2^(1/2) of it
-            yield self.wrong("rms", "is too large for the amplitudes of its sines", "check its unit, m")
+        too_large = self.rms > 0.5 * tables.LARGEST  # a sine has at most 2^(1/2) of it
+        yield from self.broken(
+            (self.shortest >= self.longest, "shortest", "is not below longest", "give a range of wavelengths"),
+            (too_large, "rms", "is too large for the amplitudes of its sines", "check its unit, m"),
+        )
 
     def sines(self) -> dict[str, Any]:
         """The lists of its sines, the longest wave first; the sum of their mean squares is that of the heights."""
@@ -143,13 +144,15 @@ class Profile(Table):
         yield from super()._broken_rules()
         for key in ("phases_deg", "wavelengths", "wavenumbers"):
             yield from self.different_lengths(key, "amplitudes")
-        if self.profile is not None and self.phases_deg is not None:
-            yield self.wrong("phases_deg", "is given together with profile", "leave it out")
-        if self.profile is None and self.profile_error is not None:
-            yield self.wrong("profile_error", "is only for a profile", "leave it out")
-        if self.spectrum and self.phases_deg is not None and len(self.phases_deg) != self.spectrum.terms:
-            what = f"has {tables.entries(self.phases_deg)}, but spectrum.terms is {self.spectrum.terms}"
-            yield self.wrong("phases_deg", what, "give one value for each term, or leave phases_deg out")
+        phases, terms = self.phases_deg, self.spectrum.terms if self.spectrum else 0
+        needless = self.profile is None and self.profile_error is not None
+        one_each = "give one value for each term, or leave phases_deg out"
+        what = f"has {tables.entries(phases or ())}, but spectrum.terms is {terms}"
+        yield from self.broken(
+            (self.profile and phases is not None, "phases_deg", "is given together with profile", "leave it out"),
+            (needless, "profile_error", "is only for a profile", "leave it out"),
+            (terms and phases is not None and len(phases) != terms, "phases_deg", what, one_each),
+        )
 
     @property
     def is_rough(self) -> bool:

@@ -2,7 +2,8 @@
 
 from functools import lru_cache
 
-from brakecli.case.case import SETTLED, Case
+from brakecli.case.case import Case
+from brakecli.case.parts import SETTLED
 from brakecli.case.roughness import surface_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import Method

@@ -67,8 +67,9 @@ def _few_errors(values: Any, handler: Callable[[Any], Any]) -> Any:
         if error.error_count() <= MOST_WRONG_ENTRIES:
             raise
         what = f"has {error.error_count()} wrong entries, of which the first {MOST_WRONG_ENTRIES} are reported"
-        errors = [*_again(error, MOST_WRONG_ENTRIES), _as_error(Problem((), what, "correct these first"))]
-        raise ValidationError.from_exception_data("list", errors) from None
+        raise ValidationError.from_exception_data(
+            "list", [*_again(error, MOST_WRONG_ENTRIES), _as_error(Problem((), what, "correct these first"))]
+        ) from None
 
 
 from_list = (Field(strict=False), WrapValidator(_few_errors))  # TOML has lists, a frozen case holds tuples
@@ -131,12 +132,19 @@ class Table(BaseModel):
         """Yield a problem if a list is not as long as another one; either may be absent."""
         values, others = getattr(self, key), getattr(self, other)
         if None not in (values, others) and len(values) != len(others):
-            what = f"has {entries(values)}, but {other} has {len(others)}"
-            yield self.wrong(key, what, f"give one value for each {other.removesuffix('s')}")
+            yield self.wrong(
+                key,
+                f"has {entries(values)}, but {other} has {len(others)}",
+                f"give one value for each {other.removesuffix('s')}",
+            )
 
     def wrong(self, key: str, what: str, remedy: str) -> Problem:
         """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
         return Problem(tuple(key.split(".")), what + found(attrgetter(key)(self)), remedy)
+
+    def broken(self, *rules: tuple[Any, str, str, str]) -> Iterator[Problem]:
+        """Yield a problem for each rule that is broken: whether it is, then the key, what is wrong, what to do."""
+        yield from (self.wrong(*problem) for broken, *problem in rules if broken)
 
     def _fill(self) -> None:
         """Give the keys that were left out their values, where these depend on other keys."""
@@ -203,8 +211,11 @@ def _as_error(problem: Problem) -> InitErrorDetails:
 def _again(error: ValidationError, most: int | None = None) -> Iterator[InitErrorDetails]:
     """The errors of a validation, or the first of them, in a form that can be raised again."""
     for each in error.errors(include_url=False)[:most]:
-        kind = PydanticCustomError(each["type"], each["type"], each.get("ctx"))
-        yield InitErrorDetails(type=kind, loc=each["loc"], input=each["input"])
+        yield InitErrorDetails(
+            type=PydanticCustomError(each["type"], each["type"], each.get("ctx")),
+            loc=each["loc"],
+            input=each["input"],
+        )
 
 
 @cache

@@ -50,8 +50,9 @@ def problems(error: ValidationError, kind: type[Table], where: str = "at the top
             yield Problem(path, "is a table, not a number" + found(value), f"did you mean {choices}?")
         elif reason != "extra_forbidden":
             too_large = reason == "float_type" and type(value) is int
-            what = _WHAT["magnitude" if too_large else reason]
-            yield Problem(path, what + found(value), f"give {_expected(path, kind)}")
+            yield Problem(
+                path, _WHAT["magnitude" if too_large else reason] + found(value), f"give {_expected(path, kind)}"
+            )
         elif path[0] == "friction" and ("friction", "coefficient") not in meant[path]:
             remedy = "the model has one coefficient, the same in stick and in slip: give friction.coefficient"
             yield Problem(path, "is unknown" + found(value), remedy)

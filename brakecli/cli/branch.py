@@ -36,8 +36,8 @@ def command(
     target = result_path(output, case) if output is not None else None
     from brakecli.files.atomic import new_output
     from brakecli.files.field import values_of
-    from brakecli.files.fields import BRANCH
-    from brakecli.front.branch_table import branch_table
+    from brakecli.files.stability_fields import BRANCH
+    from brakecli.front.stability_tables import branch_table
     from brakecli.runs.branch import branch, line_of, start_of, write
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit

@@ -49,5 +49,4 @@ def command(
             results.append({"source": source, "error": str(error)})
     show_result("classify", {"results": results}, verdicts_table, results, as_json=as_json, quiet=quiet)
     if failures:
-        lines = dict.fromkeys(str(error) for error in failures)
-        raise type(failures[0])("\n".join(lines))
+        raise type(failures[0])("\n".join(dict.fromkeys(str(error) for error in failures)))

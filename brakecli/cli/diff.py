@@ -20,14 +20,13 @@ def command(
     quiet: Quiet = False,
 ) -> None:
     """How two results differ: case, numbers, curves."""
-    from brakecli.files import fields
-    from brakecli.files.contents import difference
+    from brakecli.files.contents import DIFFERENCE_OF_TWO, difference
     from brakecli.files.field import values_of
     from brakecli.files.read import open_result
     from brakecli.front.file_tables import diff_table
 
     with open_result(first) as a, open_result(second) as b:
-        numbers = values_of(fields.DIFFERENCE_OF_TWO, difference(a, b))
+        numbers = values_of(DIFFERENCE_OF_TWO, difference(a, b))
     if output is not None:
         from brakecli.plots.result import plot_two
 

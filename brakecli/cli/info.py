@@ -13,12 +13,11 @@ def command(
     as_json: AsJson = False,
 ) -> None:
     """What a result holds, whether it is whole, what made it."""
-    from brakecli.files import fields
-    from brakecli.files.contents import contents
+    from brakecli.files.contents import INFO, contents
     from brakecli.files.field import values_of
     from brakecli.files.read import open_result
     from brakecli.front.file_tables import info_table
 
     with open_result(result) as stored:
-        numbers = values_of(fields.INFO, contents(stored))
+        numbers = values_of(INFO, contents(stored))
     show_result("info", numbers, info_table, numbers, as_json=as_json, quiet=False)

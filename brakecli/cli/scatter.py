@@ -27,7 +27,7 @@ def command(
     """How likely brakes squeal whose numbers scatter."""
     loaded = load_study(file, overrides)
     target = result_path(output, file, kind="study")
-    from brakecli.front.scatter_table import scatter_table
+    from brakecli.front.stability_tables import scatter_table
     from brakecli.scattering.scatter import engine_for, scatter
     from brakecli.sweeps.driver import keeping_points
 

@@ -37,7 +37,7 @@ def command(
     from brakecli.branches.thresholds import thresholds
     from brakecli.case.system import system_of
     from brakecli.files.field import values_of
-    from brakecli.files.fields import LOCK_IN, STABILITY, THRESHOLDS
+    from brakecli.files.stability_fields import LOCK_IN, STABILITY, THRESHOLDS
     from brakecli.front.stability_tables import stability_table
     from brakecli.runs.limits import sliding_text, within_range
 

@@ -242,8 +242,9 @@ def explained(path: Path) -> Iterator[None]:
         yield
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
         reason = getattr(error, "strerror", None) or str(error)
-        remedy = _REMEDIES.get(getattr(error, "errno", None) or 0, "")
-        raise _refused(path, reason[:1].lower() + reason[1:], remedy) from error
+        raise _refused(
+            path, reason[:1].lower() + reason[1:], _REMEDIES.get(getattr(error, "errno", None) or 0, "")
+        ) from error
 
 
 def _refused(path: Path, reason: str, remedy: str = "") -> CannotWriteError:

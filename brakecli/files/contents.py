@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError, printable
-from brakecli.files.field import flat, plain, plain_units
-from brakecli.files.fields import BRANCH, COMPARISON, LOCK_IN, RUN, SCATTER, SWEEP, WELCH
+from brakecli.files.field import Field, flat, integer, named, plain, plain_units, ratio
+from brakecli.files.fields import COMPARISON, OBJECT, RUN, SWEEP, TEXT, WELCH
 from brakecli.files.read import StoredResult, Variable
+from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER
 from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
 
@@ -41,9 +42,54 @@ _DECLARED = {
     "scatter": SCATTER,
 }
 
+HELD = (
+    Field("group", "", "group of the file", TEXT),
+    Field("name", "", "name of the variable", TEXT),
+    Field("dims", "", "names of its axes", OBJECT),
+    Field("shape", "1", "their lengths", OBJECT),
+    Field("units", "", "its unit", TEXT),
+    Field("meaning", "", "what it is", TEXT),
+)
+INFO = (
+    Field("file", "", "the file", TEXT, at="path"),
+    *named(RUN, "status"),
+    Field("kind", "", "run, sweep, comparison, stability, branch or scatter", TEXT),
+    Field("title", "", "title of the case or of the sweep", TEXT),
+    Field("whole", "", "whether every byte is as it was written; false where no digest vouches for that", "?"),
+    integer("bytes", "size of the file"),
+    integer("format_version", "version of the form of the file"),
+    Field("versions", "", "versions of brakecli and of the libraries that made it", OBJECT),
+    Field("variables", "", "all variables", OBJECT, rows=HELD),
+)
+DIFFERENT_VALUE = (
+    Field("name", "", "key of the case, or name of the number with its group", TEXT),
+    Field("a", "", "value in the first file; null where there is none", OBJECT),
+    Field("b", "", "value in the second file; null where there is none", OBJECT),
+)
+DIFFERENT_NUMBER = (*DIFFERENT_VALUE, Field("units", "", "unit of both values", TEXT))
+DIFFERENT_VARIABLE = (
+    *HELD[:2],
+    Field("shapes", "1", "lengths of its axes in both files; null where it is missing", OBJECT),
+    integer("compared", "number of values that are in both"),
+    integer("different", "number of those that differ"),
+    Field("largest", "of the variable", "largest difference of two values; null for texts"),
+    ratio("relative", "that over the largest value in both; null where that is 0"),
+    Field("units", "", "unit of the variable", TEXT),
+    Field("interpolated", "", "the axis, time or frequency, where its values differ; null otherwise", TEXT),
+)
+DIFFERENCE_OF_TWO = (
+    Field("same", "", "whether case, numbers and variables are the same", "?"),
+    Field("sentence", "", "what differs, in a sentence", TEXT),
+    Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_NUMBER),
+    Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),
+    Field("versions", "", "versions that differ", OBJECT, rows=DIFFERENT_VALUE),
+)
+"""How two files differ; neither this nor what one holds is in any file."""
+
 
 def contents(result: StoredResult) -> dict[str, Any]:
-    """What `fields.INFO` declares."""
+    """What `INFO` declares."""
     held = []
     for group in result.groups:
         for name, each in result.variables(group).items():
@@ -58,7 +104,7 @@ def contents(result: StoredResult) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Difference:
-    """How a second result differs from a first one; `fields.DIFFERENCE_OF_TWO` declares it."""
+    """How a second result differs from a first one; `DIFFERENCE_OF_TWO` declares it."""
 
     case: list[dict[str, Any]]
     numbers: list[dict[str, Any]]

@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError, UsageError, escaped
 from brakecli.faces import argument
-from brakecli.files import fields
+from brakecli.files import fields, stability_fields
 from brakecli.files.atomic import check_target, new_output
-from brakecli.files.field import plain_units
+from brakecli.files.field import labelled, plain_units
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.trust import readings
 from brakecli.files.write import FILL
@@ -33,10 +33,10 @@ _TABLES = (
     fields.HISTORY,
     fields.POINT,
     fields.CRITICAL,
-    fields.VARIED,
-    fields.MODES,
+    stability_fields.VARIED,
+    stability_fields.MODES,
     fields.ENTRY,
-    fields.BRANCH_POINT,
+    stability_fields.BRANCH_POINT,
 )
 _ORDER = [field.name for rows in _TABLES for field in rows]  # of columns
 _AXES = {
@@ -165,8 +165,7 @@ def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -
 
 
 def _head(name: str, variable: Variable) -> str:
-    units = plain_units(str(variable.attributes.get("units", "")))
-    return name if units in ("", "1") else f"{name} ({units})"
+    return labelled(name, plain_units(str(variable.attributes.get("units", ""))))
 
 
 def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:

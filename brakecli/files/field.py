@@ -59,6 +59,11 @@ class Field:
         return int(value) if self.kind == "i8" else plain(value)
 
 
+def labelled(name: str, units: str) -> str:
+    """A name and its unit in brackets, if there is one."""
+    return f"{name} ({units})" if units not in ("", "1") else name
+
+
 def plain_units(units: str) -> str:
     """A unit of a file as people write it: `N^2/Hz` and `(m/s)^2/Hz` for `(N)2 Hz-1` and `(m/s)2 Hz-1`."""
     units = re.sub(r"^\(([^/ ]*)\)2 Hz-1", r"\1^2/Hz", units).replace("2 Hz-1", "^2/Hz")

@@ -83,8 +83,7 @@ class StoredResult:
     def group_attributes(self, group: str) -> dict[str, Any]:
         """The attributes of a group."""
         with _explained(self.path):
-            found = valid.attributes_of(self._group(group), str(self.attributes.get("kind")))
-            return _Named(self.path, found)
+            return _Named(self.path, valid.attributes_of(self._group(group), str(self.attributes.get("kind"))))
 
     def text(self, name: str) -> str:
         """A text among the attributes of the root."""
@@ -168,8 +167,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
             if not trust.readings.admit(str(path), state):
                 what = "the file is truncated, damaged or was altered by another program"
                 raise ValueError(f"{what}, and only {argument('force-read')} looks at it all the same")
-            look = partial(valid.look_through, length=length, everything=bool(state))
-            try_out(stream, look)
+            try_out(stream, partial(valid.look_through, length=length, everything=bool(state)))
             # h5py gets the very file that was looked at, and does without the file locks of HDF5
             file = stack.enter_context(h5py.File(stream, "r"))
             its_kind = str(valid.plain_attribute(file, "kind"))

@@ -173,13 +173,18 @@ def parse(text: str, source: str = "", line: int = 1, number: Callable[[str], An
     try:
         return tomllib.loads(text, parse_float=number)
     except RecursionError:
-        remedy = "case files hold no list or table of more than two levels"
-        raise unfit("is nested too deep", remedy, source, line) from None
+        raise unfit(
+            "is nested too deep", "case files hold no list or table of more than two levels", source, line
+        ) from None
     except (ValueError, OverflowError) as error:
         # Beside its own error, tomllib lets through those of int() (too many digits) and of dates.
         message, place = str(error), 0
         if position := _POSITION.search(message):
             message, place = message[: position.start()], int(position[1] or 1) - 1
         shown = printable(text.split("\n")[place].strip())
-        what = f"is not valid TOML: {message[0].lower()}{message[1:]}" + (f" (found {shown})" if shown else "")
-        raise unfit(what, WRITING, source, line + place) from None
+        raise unfit(
+            f"is not valid TOML: {message[0].lower()}{message[1:]}" + (f" (found {shown})" if shown else ""),
+            WRITING,
+            source,
+            line + place,
+        ) from None

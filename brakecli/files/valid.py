@@ -15,7 +15,7 @@ import numpy as np
 from h5py import h5a, h5d, h5s, h5t, h5z
 
 from brakecli.errors import escaped
-from brakecli.files import fields
+from brakecli.files import fields, stability_fields
 from brakecli.files.field import Field
 
 LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
@@ -33,10 +33,10 @@ _ATTRIBUTES = {
     ("run", "/events"): fields.EARLIER,
     ("sweep", "/"): fields.SWEEP,
     ("comparison", "/"): fields.COMPARISON,
-    ("stability", "/"): fields.LOCK_IN,
-    ("branch", "/"): fields.BRANCH,
-    ("branch", "/branch_*"): fields.ONE_BRANCH,
-    ("scatter", "/"): fields.SCATTER,
+    ("stability", "/"): stability_fields.LOCK_IN,
+    ("branch", "/"): stability_fields.BRANCH,
+    ("branch", "/branch_*"): stability_fields.ONE_BRANCH,
+    ("scatter", "/"): stability_fields.SCATTER,
 }
 _VARIABLES = {  # the first of a kind has the length of all
     ("run", "history"): fields.HISTORY,
@@ -55,10 +55,10 @@ _VARIABLES = {  # the first of a kind has the length of all
     ),
     ("sweep", "attractors"): fields.ATTRACTOR,
     ("comparison", "/"): (fields.ENTRY_PLACE, *fields.ENTRY),
-    ("stability", "/"): (*fields.VARIED, *fields.MODES),
-    ("branch", "branch_*"): fields.BRANCH_POINT,
-    ("scatter", "/"): (fields.SAMPLE, *fields.SCATTERED),
-    ("branch", "branch_*/special"): fields.SPECIAL,
+    ("stability", "/"): (*stability_fields.VARIED, *stability_fields.MODES),
+    ("branch", "branch_*"): stability_fields.BRANCH_POINT,
+    ("scatter", "/"): (stability_fields.SAMPLE, *stability_fields.SCATTERED),
+    ("branch", "branch_*/special"): stability_fields.SPECIAL,
 }
 _OBJECTS = {f"/{each.group}": each for each in fields.RUN if each.group}  # whose items are attributes of a group
 _RISING = ("time", "frequency")

@@ -1,11 +1,11 @@
-"""What `stability` and `advise` have found, as tables for people."""
+"""What `stability`, `advise`, `branch` and `scatter` have found, as tables for people."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
 from brakecli.analysis.stability.advice import rounded
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.front.render import text_of
 from brakecli.front.tables import Row, grid, two_columns
 
@@ -13,10 +13,14 @@ if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change
     from brakecli.analysis.stability.modes import Crossing
     from brakecli.analysis.stability.report import StabilityReport
+    from brakecli.branches.answers import Answers
     from brakecli.branches.thresholds import Thresholds
+    from brakecli.branches.told import Followed
     from brakecli.runs.advise import AdviceReport
+    from brakecli.scattering.scatter import ScatterReport
     from brakecli.sweeps.lock_in import LockIn
 
+_NAMES = {"critical_below": "critical friction below own", "squeal": "squeal"}
 _STATE = {True: "stable", False: "unstable", None: "-"}
 
 
@@ -139,3 +143,79 @@ def advice_table(report: AdviceReport) -> str:
     stays = "Advice moves the loss of stability alone; below it a vibration may still exist:\n"
     grids = [meant + grid(moves)] * bool(moving) + [stays + grid(helps)] * bool(report.advice)
     return "\n\n".join((two_columns(report.title, rows), *grids, two_columns("", ends)))
+
+
+def branch_table(title: str, found: Answers, units: str) -> str:
+    """Each branch with its special points, then the answer in a sentence."""
+    rows = [
+        ("along", f"{found.parameter} from {found.lower:g} to {found.upper:g} {units.removeprefix('1')}".strip()),
+        ("critical", text_of(found.critical, units.removeprefix("1"), ".7g")),
+        ("can vibrate from", text_of(found.coexists_from, units.removeprefix("1"), ".7g")),
+        ("barrier", text_of(found.barrier, "m", ".4g")),
+    ]
+    parts = [two_columns(title, rows)]
+    for number, each in enumerate(found.branches):
+        stable = sum(point.stable for point in each.points)
+        head = f"branch {number}: {each.kind}, {len(each.points)} motions, {stable} of them stable"
+        parts.append(f"{head}{f' ({each.note})' if each.note else ''}\n{grid(_special_points(each))}")
+    parts.append(two_columns("", [("in a sentence", found.sentence)]))
+    return "\n\n".join(parts)
+
+
+def _special_points(found: Followed) -> dict[str, list[str]]:
+    marks = found.special
+    return {
+        "special point": [mark.kind for mark in marks],
+        "value": [f"{mark.value:.8g}" for mark in marks],
+        "error": [f"{mark.error:.1g}" if mark.error else "-" for mark in marks],
+        "amplitude, m": [text_of(mark.amplitude or None, form=".4g") for mark in marks],
+        "frequency, Hz": [text_of(mark.frequency or None, form=".5g") for mark in marks],
+        "why": [mark.reason or "-" for mark in marks],
+    }
+
+
+def scatter_table(report: ScatterReport) -> str:
+    """Probabilities, distributions and indices, then the answer in a sentence."""
+    parts = [grid(_probabilities(report), 1)]
+    if report.distributions:
+        parts.append(grid(_distributions(report), 1))
+    if report.indices.total:
+        parts.append(f"What decides on {report.indices.of.replace('_', ' ')}\n{grid(_indices(report), 1)}")
+    rows = [
+        ("samples", f"{report.samples}{f', {report.failed} without an answer' if report.failed else ''}"),
+        ("note", report.notes),
+        ("in a sentence", [report.sentence]),
+        ("file", str(report.output)),
+    ]
+    return "\n\n".join([*parts, two_columns(report.loaded.title, rows)])
+
+
+def _probabilities(report: ScatterReport) -> dict[str, list[str]]:
+    shown = report.probabilities.values()
+    return {
+        "a sample is": [_NAMES.get(name, name) for name in report.probabilities],
+        "probability": [f"{each.value:.2%}" for each in shown],
+        "95 % interval": [f"{each.lower:.2%} to {each.upper:.2%}" for each in shown],
+    }
+
+
+def _distributions(report: ScatterReport) -> dict[str, list[str]]:
+    from brakecli.scattering.answers import SHARES
+
+    shown = report.distributions
+    heads = [f"{each.name.replace('_', ' ')}{f', {each.units}' if each.units else ''}" for each in shown]
+    columns = {"quantiles": heads}
+    for place, share in enumerate(SHARES):
+        columns[f"{share:.0%}"] = [f"{each.quantiles[place]:.4g}" for each in shown]
+    return columns
+
+
+def _indices(report: ScatterReport) -> dict[str, list[str]]:
+    found = report.indices
+    names = sorted(found.total, key=lambda name: -found.total[name])
+    return {
+        "parameter": names,
+        "alone": [f"{found.first_order[name]:.3f}" for name in names],
+        "with all others": [f"{found.total[name]:.3f}" for name in names],
+        "±": [f"{found.error[name]:.2g}" for name in names],
+    }

@@ -193,8 +193,7 @@ def draw(picture: RunPicture) -> Figure:
         belt = picture.detail["belt"]
         factor, unit = style.prefixed(style.largest(belt), "m/s")
         size = f"= {factor * belt[-1]:.4g}" if np.ptp(belt) == 0.0 else f"up to {factor * style.largest(belt):.4g}"
-        note = f"U {size} {unit}, off the scale"
-        axes.set_title(note, loc="right", size=8.5, color=style.VERMILION)
+        axes.set_title(f"U {size} {unit}, off the scale", loc="right", size=8.5, color=style.VERMILION)
     spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
     for axes, time in zip(panels[:, 0], spans, strict=False):
         style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s", "time")

@@ -76,14 +76,13 @@ def _tornado(axes: Axes, result: StoredResult, of: str) -> None:
         raise style.unreadable(result, "its indices do not fit its parameters")
     order = np.argsort(total)
     places = np.arange(len(names))
-    look = {"ecolor": style.DARK, "capsize": 3.0}
     axes.barh(
         places,
         total[order],
         height=0.62,
         color="#9CCBE8",
         xerr=error[order],
-        error_kw=look,
+        error_kw={"ecolor": style.DARK, "capsize": 3.0},
         label="with all others",
     )
     axes.barh(places, np.clip(first[order], 0.0, None), height=0.3, color=style.BLUE, label="alone")

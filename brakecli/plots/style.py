@@ -18,6 +18,7 @@ from matplotlib.ticker import FixedFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError
+from brakecli.files.field import labelled as labelled
 from brakecli.files.read import StoredResult
 from brakecli.files.trust import readings
 from brakecli.files.write import FILL
@@ -191,11 +192,6 @@ def unit_of(attributes: Mapping[str, Any]) -> str:
     """The unit of a variable; none where it is "1". A dollar sign, with which formulas begin, is left out."""
     units = str(attributes.get("units", "")).replace("$", "")
     return "" if units == "1" else units
-
-
-def labelled(name: str, units: str) -> str:
-    """A name and its unit, if there is one."""
-    return f"{name} ({units})" if units else name
 
 
 def set_ticks(axis: Axis, low: float, high: float, unit: str = "", name: str = "") -> None:

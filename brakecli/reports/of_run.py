@@ -21,6 +21,7 @@ from brakecli.errors import escaped
 from brakecli.files import fields
 from brakecli.files.field import flat, named
 from brakecli.files.read import StoredResult
+from brakecli.files.stability_fields import ADVICE
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
@@ -77,7 +78,7 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     answer = [*stretches, _sentence(found), theory]
     name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
     numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
-    numbers = {**numbers, **numbers_of(named(fields.ADVICE, "critical_friction", "margin"), advice.numbers())}
+    numbers = {**numbers, **numbers_of(named(ADVICE, "critical_friction", "margin"), advice.numbers())}
     drawn, change = picture(PICTURE, partial(draw, result)), [*_to_change(advice, found.get("regime"))]
     return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions)
 
@@ -182,8 +183,10 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
         rows.append((name, shown(mode.frequency, "Hz"), f"{growth}, damping ratio {ratio}"))
     yield Table(rows)
     if report.equilibrium is not None and report.belt_speed:
-        words = "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient"
-        yield picture(words, partial(_diagram, advice))
+        yield picture(
+            "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient",
+            partial(_diagram, advice),
+        )
     if advice.advice:
         yield _changes(advice.advice, advice.wanted_margin)
     known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]

@@ -14,6 +14,16 @@ from brakecli.errors import CaseError, UsageError, escaped
 from brakecli.files import fields
 from brakecli.files.field import Field
 from brakecli.files.read import StoredResult
+from brakecli.files.stability_fields import (
+    BRANCH,
+    INDEX,
+    LOCK_IN,
+    OUTCOME,
+    PROBABILITY,
+    SCATTER,
+    SCATTERING,
+    SPECIAL,
+)
 from brakecli.files.write import FILL
 from brakecli.plots import style
 from brakecli.plots.gather import gather, numeric
@@ -140,7 +150,7 @@ def part_of_other(result: StoredResult) -> Part:
     Raises UnreadableResultError.
     """
     kind = str(result.attributes["kind"])
-    declared = {"stability": fields.LOCK_IN, "branch": fields.BRANCH, "scatter": fields.SCATTER}
+    declared = {"stability": LOCK_IN, "branch": BRANCH, "scatter": SCATTER}
     apart = ("title", "recommended", "sentence")
     known = [
         replace(each, units=_unit_of_key(result)) if each.units == "of the key" else each
@@ -164,14 +174,14 @@ def part_of_other(result: StoredResult) -> Part:
         said, tables_of_study = _study(result)
         answer.append(said)
         sections.insert(0, Section("Study", tables_of_study))
-        names = fields.OUTCOME, *fields.PROBABILITY
+        names = OUTCOME, *PROBABILITY
         rows = [(NAMES.get(name, name), *more) for name, *more in _rows(result, "/", names)]
         tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
         shares = zip(rows, style.read_column(result, "probability").tolist(), strict=True)
         numbers = {**{f"probability: {name}": (share, "1") for (name, *_), share in shares}, **numbers}
         if "total" in result.variables("/"):
             head = ("parameter", "alone it makes", "with all others", "±, of the variance")
-            tables.append(Table(_rows(result, "/", (fields.SCATTERING, *fields.INDEX)), head))
+            tables.append(Table(_rows(result, "/", (SCATTERING, *INDEX)), head))
     best = result.attributes.get("recommended")
     if kind == "comparison" and isinstance(best, int):
         method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))
@@ -238,7 +248,7 @@ def _special(result: StoredResult) -> Table:
     for group in sorted(groups, key=lambda each: (len(each), each)):  # branch_10 comes after branch_9
         branch = group.removesuffix("/special")
         which = f"{branch.replace('_', ' ')}, {result.group_attributes(branch).get('kind', '')}"
-        rows += [(which, *row) for row in _rows(result, group, fields.SPECIAL)]
+        rows += [(which, *row) for row in _rows(result, group, SPECIAL)]
     return Table(rows, ("branch", "special point", "at", "error", "amplitude of x", "frequency", "why"))
 
 

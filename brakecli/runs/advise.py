@@ -17,7 +17,7 @@ from brakecli.branches.thresholds import Thresholds, thresholds
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.field import values_of
 from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
 from brakecli.runs.run import asked, judged_in_memory

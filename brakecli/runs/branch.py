@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from brakecli.branches.answers import Answers
-from brakecli.branches.explore import Explorer, Followed
+from brakecli.branches.explore import Explorer
 from brakecli.branches.line import ALONE, Line
+from brakecli.branches.told import Followed
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_resolved
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, integer, values_of
 from brakecli.files.read import open_result
 from brakecli.files.write import ResultFile, new_result

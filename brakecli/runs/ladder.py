@@ -47,8 +47,7 @@ class _Axis:
         if math.isinf(self.before) or self.last >= self.before:
             return math.inf
         least = max(self.last, 3.0 * self.before / 12.0)
-        left = max(least, 3.0 * self.last / (self.before / self.last - 1.0))
-        return self.margin * left
+        return self.margin * max(least, 3.0 * self.last / (self.before / self.last - 1.0))
 
 
 @dataclass

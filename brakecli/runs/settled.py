@@ -11,7 +11,7 @@ from typing import Generic, NamedTuple, Protocol, TypeVar
 
 from brakecli.analysis.regime.table import Regime
 from brakecli.analysis.regime.verdict import Verdict
-from brakecli.case.case import SETTLED
+from brakecli.case.parts import SETTLED
 from brakecli.runs.certificate import Certificate
 from brakecli.runs.cost import beside_seconds, steps_and_seconds
 from brakecli.solver.motion import Work

@@ -15,7 +15,7 @@ from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.motion import solve
-from brakecli.solver.records import V_X
+from brakecli.solver.motions import V_X
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial, System

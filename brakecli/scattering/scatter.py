@@ -14,7 +14,7 @@ from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
@@ -218,7 +218,8 @@ def _report(
     count = sets * many
     hits = {name: each.reshape(sets, many) for name, each in _outcomes(study, drawing, columns, count).items()}
     failed = hits["failed"].ravel()
-    index = Indices(study.indices_of, note=_without(study))
+    apart = "no indices: with correlations, the share of one parameter is not its own"
+    index = Indices(study.indices_of, note=apart * (study.correlation is not None and study.indices_of != "none"))
     if drawing.others is not None:
         rest = {name: each[count:] for name, each in columns.items()} if beside is None else beside
         of = squeals(study, rest).astype(float) if study.indices_of == "squeal" else rest[study.indices_of]
@@ -226,6 +227,7 @@ def _report(
         index = Indices.find(study.indices_of, study.names, answers, study.seed)
     kept = {name: each[:count] for name, each in columns.items()}
     squealing = hits["squeal"].ravel()
+    others = f"{count} samples in place of {study.samples}: as many as {SCRAMBLINGS} sequences need"
     told = [
         Distribution(name, units, quantiles(np.where(squealing | (name not in _OF_SQUEAL), kept[name], np.nan)))
         for name, units in _TOLD
@@ -246,7 +248,7 @@ def _report(
         indices=index,
         columns={**kept, "squeal": squealing.astype(np.int64)},
         values=drawing.values,
-        notes=[*loaded.beside(loaded.base.case), *_notes(study, count, index)],
+        notes=[*loaded.beside(loaded.base.case), *filter(None, [index.note, others * (count != study.samples)])],
     )
 
 
@@ -278,19 +280,6 @@ def squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]
         if study.method == "run":
             return np.asarray(within & (columns["excitation"] == Excitation.SELF_EXCITED.value.encode()))
         return np.asarray(within & (columns["growth_rate"] > 0.0))
-
-
-def _without(study: Study) -> str:
-    if study.correlation is not None and study.indices_of != "none":
-        return "no indices: with correlations, the share of one parameter is not its own"
-    return ""
-
-
-def _notes(study: Study, count: int, index: Indices) -> list[str]:
-    notes = [index.note] if index.note else []
-    if count != study.samples:
-        notes.append(f"{count} samples in place of {study.samples}: as many as {SCRAMBLINGS} sequences need")
-    return notes
 
 
 def _write(result: ResultFile, report: ScatterReport) -> None:

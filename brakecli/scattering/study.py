@@ -68,22 +68,24 @@ class Parameter(Table):
             if len(alone) == 1:
                 yield self.wrong(alone[0], "is given alone", f"give {one} and {other} together")
         if not given:
-            remedy = "give low and high, mean and deviation, or tolerance_percent"
-            yield Problem(("low",), MISSING, remedy, instead=_NUMBERS)
-        if self.tolerance_percent is not None and len(given) > 1:
-            others = " and ".join(given[:-1])
-            yield self.wrong("tolerance_percent", f"is given together with {others}", "keep one of the two")
-        if bounded and spread and self.low is not None:
-            yield self.wrong("mean", "is given together with low and high", "keep one of the two")
-        if self.low is not None and self.high is not None and not self.low < self.high:
-            yield self.wrong("high", "is not above low", "give a range")
-        if self.mode is not None:
-            if self.distribution != "triangular" or self.low is None or self.high is None:
-                yield self.wrong("mode", "is only for a triangular distribution with low and high", "leave it out")
-            elif not self.low <= self.mode <= self.high:
-                yield self.wrong("mode", "is not between low and high", "give a value between them")
-        positive = all(value is None or value > 0.0 for value in (self.low, self.mean))
-        sound = self.low is None or self.high is None or self.low < self.high
+            yield Problem(
+                ("low",), MISSING, "give low and high, mean and deviation, or tolerance_percent", instead=_NUMBERS
+            )
+        low, high, mode = self.low, self.high, self.mode
+        sound = low is None or high is None or low < high
+        has_mode = self.distribution == "triangular" and low is not None and high is not None
+        beside = mode is not None and low is not None and high is not None and not low <= mode <= high
+        keep, others = "keep one of the two", " and ".join(given[:-1])
+        in_part = self.tolerance_percent is not None and len(given) > 1
+        only = "is only for a triangular distribution with low and high"
+        yield from self.broken(
+            (in_part, "tolerance_percent", f"is given together with {others}", keep),
+            (bounded and spread and low is not None, "mean", "is given together with low and high", keep),
+            (not sound, "high", "is not above low", "give a range"),
+            (mode is not None and not has_mode, "mode", only, "leave it out"),
+            (has_mode and beside, "mode", "is not between low and high", "give a value between them"),
+        )
+        positive = all(value is None or value > 0.0 for value in (low, self.mean))
         cut = not bounded and None not in (self.mean, self.deviation, self.low, self.high)
         if cut and sound and (normal or positive):
             _, first, last, _ = self._law
@@ -138,42 +140,35 @@ class Parameter(Table):
             try:
                 return Parameter.model_validate(data)
             except ValidationError as error:
-                wrong = wording.problems(error, Parameter)
-                raise CaseError([replace(each, path=("tolerance_percent",)) for each in wrong]) from None
+                raise CaseError(
+                    [replace(each, path=("tolerance_percent",)) for each in wording.problems(error, Parameter)]
+                ) from None
         raise CaseError([self.wrong("tolerance_percent", f"is part of nothing: {what}", remedy)])
 
     @cached_property
     def _law(self) -> tuple[Any, float, float, bool]:
         """The distribution, the probabilities below both ends of what is kept of it, or, if so, above them."""
-        low, high, mean, deviation = self.low, self.high, self.mean, self.deviation
-        if self.distribution in ("uniform", "triangular"):
-            if low is None or high is None:
-                assert mean is not None
-                assert deviation is not None
-                half = deviation * math.sqrt(3.0 if self.distribution == "uniform" else 6.0)
+        low, high, mean, deviation = (getattr(self, name) for name in _NUMBERS[:4])
+        uniform, normal = (self.distribution == name for name in ("uniform", "normal"))
+        bounded, whole = uniform or self.distribution == "triangular", None in (low, high, mean, deviation)
+        if bounded:
+            if low is None:
+                half = deviation * math.sqrt(3.0 if uniform else 6.0)
                 low, high = mean - half, mean + half
             width, mode = high - low, 0.5 * (low + high) if self.mode is None else self.mode
-            if self.distribution == "uniform":
-                return stats.uniform(low, width), 0.0, 1.0, False
-            return stats.triang((mode - low) / width, low, width), 0.0, 1.0, False
-        normal = self.distribution == "normal"
-        if mean is None or deviation is None:
-            assert low is not None
-            assert high is not None
+            law = stats.uniform(low, width) if uniform else stats.triang((mode - low) / width, low, width)
+        elif mean is None:
             ends = (low, high) if normal else (math.log(low), math.log(high))
             middle, spread = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / (2.0 * _LIMIT)
             law = stats.norm(middle, spread) if normal else stats.lognorm(spread, scale=math.exp(middle))
-            return law, 0.0, 1.0, False
-        if normal:
+        elif normal:
             law = stats.norm(mean, deviation)
         else:
             spread = math.sqrt(math.log1p((deviation / mean) ** 2))
             law = stats.lognorm(spread, scale=mean * math.exp(-0.5 * spread**2))
-        if low is None or high is None:
+        if bounded or whole:
             return law, 0.0, 1.0, False
-        above = bool(
-            low > law.median()
-        )  # there probabilities above are exact, and those below are 1 but for rounding
+        above = bool(low > law.median())  # probabilities above are exact there; those below are 1 but for rounding
         ends = (law.sf(low), law.sf(high)) if above else (law.cdf(low), law.cdf(high))
         return law, float(ends[0]), float(ends[1]), above
 
@@ -227,8 +222,9 @@ class Study(OverCase):
         for index, each in enumerate(self.parameter):
             for text in each.paths:
                 if key_path(text) in taken:
-                    remedy = "let each key path scatter once"
-                    yield Problem(("parameter", index, "key"), "is set twice" + found(text), remedy)
+                    yield Problem(
+                        ("parameter", index, "key"), "is set twice" + found(text), "let each key path scatter once"
+                    )
                 taken.add(key_path(text))
         if self.correlation is not None:
             yield from self._wrong_correlation()

@@ -42,7 +42,8 @@ def sliding_phase(velocity: float) -> int:
 def held(pull: float, push: float, pull_rounding: float, push_rounding: float) -> int:
     """The phase of a touching shoe at the wheel's velocity, by its margins in stick, Eqs. (3)-(5).
 
-    It sticks if friction can hold it, up to rounding. Otherwise it slips the way that friction cannot prevent.
+    `pull` is φ F_y - needed and `push` φ F_y + needed. It sticks if friction can hold it, up to rounding.
+    Otherwise it slips the way that friction cannot prevent.
     """
     if pull < -pull_rounding:
         return BACKWARD
@@ -68,7 +69,7 @@ def anchored(x: float, travel: float, travel_low: float) -> tuple[float, float]:
 
 @kernel(float64(float64, float64, float64, float64))
 def carried(anchor: float, anchor_low: float, travel: float, travel_low: float) -> float:
-    """The place x (m) of a shoe in stick: that of its anchor, without any drift."""
+    """The place x (m) of a shoe in stick: its anchor plus what the wheel has travelled, without any drift."""
     return (anchor + travel) + (anchor_low + travel_low)
 
 

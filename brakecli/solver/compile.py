@@ -1,36 +1,24 @@
-"""How kernels are compiled: one decorator, one cache on disk, and calls by address.
+"""How kernels are compiled: one decorator, and calls by address.
 
 A scheme or a contact evaluator is handed to the time loop as the address of its machine code, so that one compiled
 loop serves them all and stays in the cache. Kernels neither allocate, raise nor print: they return a status.
 """
 
-import errno
-import fcntl
-import hashlib
-import io
-import os
-import stat
 import sys
-import time
-import zlib
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numba import boolean, float64, int64, njit, types
-from numba.core import caching as numba_caching
+from numba import boolean, float64, int64, types
 from numba.core import cgutils
-from numba.core import codegen as numba_codegen
-from numba.core import config as numba_config
 from numba.core import event as numba_events
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from brakecli.solver import compiling
+from brakecli.solver.kernel_cache import compile_for, config, not_compiled
 
 Floats = NDArray[np.float64]
 vector = float64[::1]
@@ -38,9 +26,6 @@ vector = float64[::1]
 FAST = frozenset({"reassoc", "contract", "nsz"})
 """What fast loops allow: sums in any order, fused multiply-add, no signed zeros; NaN stays NaN."""
 
-config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
-caching: Any = numba_caching  # has no types
-codegen: Any = numba_codegen  # has no types
 events: Any = numba_events  # has no types
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -57,39 +42,6 @@ def _leave_out_blas() -> None:
 
 
 _leave_out_blas()
-
-
-def source_hash(folder: Path = Path(__file__).parent) -> str:
-    """Hash of the sources of the solver: otherwise a cached caller would keep the old code of an edited helper."""
-    sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
-    return hashlib.sha256(sources).hexdigest()[:16]
-
-
-def _cache_directory() -> Path | None:
-    """Where machine code is kept; None where nothing can be written, or where somebody else could write, too."""
-    global _lock
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
-    try:
-        directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        directory.mkdir(mode=0o700, exist_ok=True)
-        for each, others in ((directory.parent, 0), (directory, 0o022)):
-            found = each.lstat()
-            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & others:
-                raise PermissionError(errno.EPERM, "it is not a folder in which this user alone writes", str(each))
-        _lock = os.open(directory / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
-    except (OSError, RuntimeError) as error:
-        reason = f"{getattr(error, 'strerror', None) or error} (found {getattr(error, 'filename', None) or base})"
-        what = f"the cache of compiled kernels cannot be used: {reason[0].lower()}{reason[1:]}"
-        compiling.set_trouble(f"{what}; name a folder of your own with XDG_CACHE_HOME")
-        return None
-    return directory
-
-
-_lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
-CACHE = _cache_directory()
-PATIENCE = 60.0  # s that another process may take to compile a kernel
-_held: list[int] = []  # the bytes locked for the kernels that this process compiles, each called by the one before
 
 
 class _Compiling(events.Listener):  # type: ignore[misc]
@@ -121,114 +73,8 @@ class _ForKernels(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What the compiler asks for where another kernel calls this one."""
         if self._can_compile:
-            _compile(self, self.signature)
+            compile_for(self, self.signature)
         return super().get_call_template(args, kws)
-
-
-class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
-    """The files of a kernel in the cache, each with its checksum at the end, which pickle does not read.
-
-    A damaged file counts as missing, so that it is written anew: damaged machine code would end the process.
-    """
-
-    def load(self, key: Any) -> Any:
-        found = super().load(key)
-        if found is None:
-            _wait_for_others(zlib.crc32(Path(self._index_path).name.encode()))
-            found = super().load(key)  # another process may have compiled it meanwhile
-        return found
-
-    def _load_index(self) -> Any:
-        return super()._load_index() if _is_whole(self._index_path) else {}
-
-    def _load_data(self, name: str) -> Any:
-        if not _is_whole(self._data_path(name)):
-            raise FileNotFoundError(name)
-        return super()._load_data(name)
-
-    @contextmanager
-    def _open_for_write(self, filepath: str) -> Iterator[Any]:
-        with super()._open_for_write(filepath) as file:
-            contents = io.BytesIO()
-            yield contents
-            file.write(contents.getvalue() + _checksum(filepath, contents.getvalue()))
-
-
-def _wait_for_others(place: int) -> None:
-    """Take the lock of a kernel, so that one process compiles it while others may compile other kernels."""
-    global PATIENCE
-    assert CACHE is not None
-    _held.append(place)
-    end = time.monotonic() + PATIENCE
-    with suppress(OSError):  # a disk without locks: do without
-        while True:
-            with suppress(BlockingIOError):
-                fcntl.lockf(_lock, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, place)
-                return
-            if time.monotonic() > end:
-                what = f"{CACHE / 'lock'}: another process has compiled a kernel for more than {PATIENCE:g} s"
-                compiling.set_trouble(f"{what}, and is no longer waited for; end it if it hangs")
-                PATIENCE = 0.0  # nor for the other kernels
-                return
-            time.sleep(0.02)
-
-
-def _is_whole(path: str) -> bool:
-    try:
-        data = Path(path).read_bytes()
-    except OSError:
-        return False
-    return data[-4:] == _checksum(path, data[:-4])
-
-
-def _checksum(path: str, contents: bytes) -> bytes:
-    """What the file at a path ends with: of its name as well, since another kernel has other contents."""
-    return zlib.crc32(contents, zlib.crc32(Path(path).name.encode())).to_bytes(4)
-
-
-def _not_compiled(function: Any, options: dict[str, Any]) -> Any:
-    """A kernel that is not compiled yet, with its place in the cache, if that can be used."""
-    if CACHE is not None:
-        before = config.CACHE_DIR, caching.IndexDataCacheFile
-        config.CACHE_DIR, caching.IndexDataCacheFile = str(CACHE), _CheckedFiles
-        try:
-            return njit(cache=True, **options)(function)
-        except Exception:  # the cache cannot be used after all: do without
-            pass
-        finally:
-            config.CACHE_DIR, caching.IndexDataCacheFile = before
-    return njit(**options)(function)
-
-
-class _Whole(codegen.JITCodeLibrary):  # type: ignore[misc]
-    """The machine code of a kernel with a copy of its own of each kernel that it calls.
-
-    Numba lets a process use the first copy that it comes by: one that has just compiled a helper alone would take
-    that, and one that loads the caller the caller's, where a sum may have another order.
-    """
-
-    def _optimize_final_module(self) -> None:
-        for function in self._final_module.functions:
-            if function.linkage == codegen.ll.Linkage.linkonce_odr:  # what kernels become that another one calls
-                function.linkage = codegen.ll.Linkage.internal
-        super()._optimize_final_module()
-
-
-def _compile(dispatcher: Any, signature: Any) -> None:
-    """Compile a kernel for one signature, or load it from the cache."""
-    before, maker = len(_held), dispatcher.targetctx.codegen()
-    maker._library_class, libraries = _Whole, maker._library_class
-    try:
-        dispatcher.compile(signature)
-    except Exception:  # the cache cannot be written, on a full disk: do without
-        dispatcher._cache = caching.NullCache()
-        dispatcher.compile(signature)
-    finally:
-        maker._library_class = libraries
-        while len(_held) > before:
-            with suppress(OSError):  # a disk without locks
-                fcntl.lockf(_lock, fcntl.LOCK_UN, 1, _held.pop())
-    dispatcher.disable_compile()
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
@@ -243,11 +89,11 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         private = not inlined or function.__name__.startswith("_")
         options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
         options["no_cpython_wrapper"] = private
-        compiled: Any = _not_compiled(function, options)
+        compiled: Any = not_compiled(function, options)
         if private and not config.DISABLE_JIT:
             compiled.__class__, compiled.signature = _ForKernels, signature
         elif not config.DISABLE_JIT:
-            _compile(compiled, signature)
+            compile_for(compiled, signature)
         return compiled  # type: ignore[no-any-return]
 
     return compile_
@@ -264,7 +110,7 @@ def address(function: Any) -> int:
             _functions.append(function)
         return _functions.index(function)
     if not function.overloads:  # no kernel that has been compiled here calls it by its name
-        _compile(function, function.signature)
+        compile_for(function, function.signature)
     (compiled,) = function.overloads.values()
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

@@ -28,7 +28,7 @@ def minimise(
 
 @kernel(types.UniTuple(float64, 2)(float64, float64, float64, float64, float64))
 def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tuple[float, float]:
-    """Derivatives of d and e by the normal force F (g2 grows with F, g0 with phi F) on the branch `side`."""
+    """Derivatives of d and e, (15)-(17), by the normal force F (g2 grows with F, g0 with phi F), on a `side`."""
     if side == 0.0:
         return 0.0, 1.0 / a_22
     a = a_11 * a_22 - a_12 * a_12
@@ -37,7 +37,10 @@ def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tu
 
 @kernel(types.UniTuple(float64, 2)(float64, boolean, float64, float64, float64))
 def observed(sliding: float, holds: bool, needed: float, normal: float, bound: float) -> tuple[float, float]:
-    """State of the contact and friction force (N); `needed` keeps the shoe in stick, if friction `holds` it."""
+    """State of the contact and friction force (N); `needed` keeps the shoe in stick, if friction `holds` it.
+
+    F_x is `needed` in stick, (4), and -side φ F_y in slip, (5).
+    """
     if normal == 0.0:
         return _SEPARATED, 0.0
     if holds:

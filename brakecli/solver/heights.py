@@ -50,7 +50,7 @@ def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
 
 @kernel(types.UniTuple(vector, 2)(float64, LAYER))
 def phases(x: float, layer: Layer) -> tuple[Floats, Floats]:
-    """Sine and cosine of the phase of each wave; they come eight at a time."""
+    """Sine and cosine of the phase ωx + ψ of each wave; they come eight at a time."""
     pad, waves = layer.pad, layer.pad.wheel_terms
     at, omega_at, eights = pad.nodes + 2 * BESIDE + 2 * TILE, pad.wheel_at + waves, (waves + 7) // 8 * 8
     sines, cosines = layer.scratch[at : at + eights], layer.scratch[at + eights : at + 2 * eights]
@@ -63,7 +63,7 @@ def phases(x: float, layer: Layer) -> tuple[Floats, Floats]:
 
 @kernel(void(float64, vector, LAYER))
 def _sum_waves(x: float, f2: Floats, layer: Layer) -> None:
-    """f2 where the shoe is at x, in whole tiles."""
+    """f2 = Σ g sin(ω(ξ + x) + ψ) where the shoe is at x, in whole tiles."""
     pad, tables, (sines, cosines) = layer.pad, layer.tables, phases(x, layer)
     waves, at = pad.wheel_terms, pad.waves_at
     for begin in range(0, f2.size, TILE):
@@ -119,7 +119,10 @@ def _row(point: int, size: int, layer: Layer) -> Floats:
 
 @kernel(void(float64, vector), fastmath=FAST)
 def _weigh(part: float, weights: Floats) -> None:
-    """Lagrange's weights of the points, this part of the way from the last one of the first half to the next."""
+    """Lagrange's weights of the points, this part of the way from the last one of the first half to the next.
+
+    That of point i is Π (p - j)/(i - j) over all other points j, which lie at -n/2 + 1 … n/2.
+    """
     product = 1.0
     for i in range(POINTS // 2):
         product *= (part + i) * (part - 1.0 - i)

@@ -27,7 +27,10 @@ _evaluate_at = at_address(EVALUATE)
 
 @kernel(types.UniTuple(float64, 2)(LAYER, PROBLEM_TYPE, float64))
 def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
-    """Minimise for the normal force f, evaluate the contact there; the residual and the rounding in it (N)."""
+    """Minimise for the normal force f, evaluate the contact there; the residual and the rounding in it (N).
+
+    The residual is r(f) = F_y(x_0 + gain d, y_0 + gain e) - f.
+    """
     layer = borrowed(layer)
     a_11, a_12, a_22, phi = problem.a_11, problem.a_12, problem.a_22, problem.phi
     d, e, side = minimise(a_11, a_12, a_22, problem.g_1, problem.g_2 + f, phi * f, problem.belt)
@@ -44,8 +47,8 @@ def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
 def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> bool:
     """Take the force f if the last evaluation proves that its residual is at most `allowed` (N); whether it does.
 
-    Up to f the contact is linear, but for places that begin or cease to touch, for the curvature of f2 and for the
-    error of its slope. `contact` becomes that of f.
+    Up to f the contact is linear, F_y + ∂F_y/∂x Δx + ∂F_y/∂y Δy, but for places that begin or cease to touch, for
+    the curvature of f2 and for the error of its slope. `contact` becomes that of f.
     """
     pad, contact, gain = layer.pad, layer.contact, problem.gain
     a_11, a_12, a_22, phi = problem.a_11, problem.a_12, problem.a_22, problem.phi
@@ -70,9 +73,10 @@ def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> b
 def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     """Bracketed Newton iteration from the guess problem.normal_force >= 0; (outcome, evaluations, rising points).
 
-    A rising point is one where the residual does not fall with F (r' >= 0): the step's solution need not be
-    unique there, as in Painleve's paradox. There is always one: where F = 0 the residual is not negative, and for
-    a large F, since a11 a22 > a12², the shoe either sticks and lifts off or slips and lifts off.
+    F becomes F - r/r' with r' = gain (∂F_y/∂x d' + ∂F_y/∂y e') - 1. A rising point is one where the residual does
+    not fall with F (r' >= 0): the step's solution need not be unique there, as in Painleve's paradox. There is
+    always one: where F = 0 the residual is not negative, and for a large F, since a11 a22 > a12², the shoe either
+    sticks and lifts off or slips and lifts off.
     """
     layer = borrowed(layer)
     contact = layer.contact

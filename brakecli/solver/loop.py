@@ -80,7 +80,10 @@ def sample(p: Plant, row: Floats) -> None:
 
 @kernel(float64(PLANT))
 def _needed(p: Plant) -> float:
-    """The friction force (N) that it takes to stick, where the step that has been taken has its forces."""
+    """The friction force (N) that it takes to stick, where the step that has been taken has its forces.
+
+    By (6) it is m U̇ + b_xx U + b_xy ẏ + c_xx x + c_xy y + Q_x.
+    """
     c, state, problem = p.c, p.state, p.problem
     x, y, v_y, belt = state.x_old, state.y_old, state.v_y, problem.belt_now
     if p.grid.lag == 0:  # in the middle of the step, as the normal force is
@@ -91,7 +94,10 @@ def _needed(p: Plant) -> float:
 
 @kernel(float64(PLANT, float64, float64))
 def _margin_rate(p: Plant, t: float, needed: float) -> float:
-    """How fast the force that a stuck shoe needs leaves the friction cone, where its margin runs out (N/s)."""
+    """How fast φ F_y - |needed| falls or rises, where the margin of a stuck shoe runs out (N/s).
+
+    The rate of `needed` follows from (6), with ÿ by (7).
+    """
     c, state, problem, h = p.c, p.state, p.problem, p.s.h
     v_y, belt, force = state.v_y, problem.belt, problem.normal_force
     belt_slope, load_slope = (problem.belt_next - problem.belt_now) / h, slope_at(p.drive.load, t)
@@ -197,6 +203,20 @@ def _renew(p: Plant, number: int) -> None:
     b.x, b.y, b.v_x, b.v_y = t.x, t.y, t.v_x, t.v_y
 
 
+@kernel(void(PLANT, float64, float64))
+def _count(p: Plant, before: float, after: float) -> None:
+    """Count how the shoe slides or sticks in a step, with the sliding velocities at both ends (m/s)."""
+    counts, force = p.counts, p.problem.normal_force
+    if before * after <= 0.0 and force > 0.0:
+        counts.turns += 1
+    if after == 0.0:
+        counts.held += 1
+    else:
+        if counts.held <= 1 and after * counts.side < 0.0:  # turned, with a step in stick at most
+            counts.crossing = max(counts.crossing, force)
+        counts.side, counts.held = math.copysign(1.0, after), 0
+
+
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
 def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
@@ -210,7 +230,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     solve, belt = _solve_at(p.plug.solve), p.drive.belt
     row, due = 0, grid.lag % grid.per_sample
     sampled, part = counts.level // grid.per_sample, counts.level % grid.per_sample
-    belt_next = value_at(belt, grid.interval * sampled + part * s.h)
+    problem.belt_next = value_at(belt, grid.interval * sampled + part * s.h)
     while counts.level < stop:
         if part == due:
             sample(p, rows[row])
@@ -219,9 +239,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
                 _renew(p, sampled)
         # A level's time is that of the sample before it plus whole steps: no rounding piles up.
         t, t_low = grid.interval * sampled, (part + grid.weighted) * s.h
-        belt_now = belt_next
-        belt_next = value_at(belt, t + (part + 1) * s.h)
-        problem.belt_now, problem.belt_next = belt_now, belt_next
+        problem.belt_now, problem.belt_next = problem.belt_next, value_at(belt, t + (part + 1) * s.h)
         problem.load = value_at(p.drive.load, t + t_low)
         if layer.pad.wheel_terms > 0:
             travel, travel_low = integral_at(belt, t, t_low)
@@ -231,43 +249,33 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             problem.normal_force = max(3.0 * (state.force - state.force_before) + state.force_earlier, 0.0)
         state.force_earlier, state.force_before = state.force_before, state.force
         outcome, evaluations, rising = solve(layer, problem, grid.most)
-        counts.evaluations += evaluations
-        counts.most = max(counts.most, evaluations)
-        if rising > 0:
-            counts.rising += 1
+        counts.evaluations, counts.most = counts.evaluations + evaluations, max(counts.most, evaluations)
+        counts.rising += 1 if rising > 0 else 0
         if outcome != SOLVED:
             if counts.unconverged < events.shape[0]:
-                events[counts.unconverged, 0] = t + t_low
-                events[counts.unconverged, 1] = problem.residual
+                events[counts.unconverged, 0], events[counts.unconverged, 1] = t + t_low, problem.residual
             counts.unconverged += 1
             if grid.go_on == 0 or not math.isfinite(problem.normal_force):
                 return _UNCONVERGED
         if layer.contact.valid == 0:
             return _NOT_CLOSED
-        v_before = state.v_x
-        before = v_before - belt_now
+        v_before, before = state.v_x, state.v_x - problem.belt_now
         finish(c, s, state, problem, layer.contact, p.work)
-        after = state.v_x - belt_next
+        after = state.v_x - problem.belt_next
         if p.tangent.on == 1:
             _disturb(p, before, after)
         if track.on == 1:
             phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
             if phase != track.phase or not state.v_x * track.way > 0.0:
-                _follow(p, phase, t + part * s.h, v_before, before + grid.lag * (belt_next - belt_now))
-        if before * after <= 0.0 and problem.normal_force > 0.0:
-            counts.turns += 1
-        if after == 0.0:
-            counts.held += 1
-        else:
-            if counts.held <= 1 and after * counts.side < 0.0:  # turned, with a step in stick at most
-                counts.crossing = max(counts.crossing, problem.normal_force)
-            counts.side, counts.held = math.copysign(1.0, after), 0
+                _follow(
+                    p, phase, t + part * s.h, v_before, before + grid.lag * (problem.belt_next - problem.belt_now)
+                )
+        _count(p, before, after)
         if not abs(state.x) + abs(state.y) + abs(state.v_x) + abs(state.v_y) < BOUND:
             return _DIVERGED
         counts.kinds[layer.contact.kind] += 1
         counts.level += 1
-        if problem.side == 0.0:
-            counts.stuck = counts.level
+        counts.stuck = counts.level if problem.side == 0.0 else counts.stuck
         part += 1
         if part == grid.per_sample:
             sampled, part = sampled + 1, 0

@@ -13,7 +13,7 @@ import numpy as np
 from numba import float64, int64, types, void
 
 from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.records import MOTION_TYPE, POWERS, STAGES
+from brakecli.solver.motions import MOTION_TYPE, POWERS, STAGES
 
 END_STAGE = 12
 USED, LAST, TERMS, ORDER = np.array([[12, 6], [16, 13], [7, 4], [8, 5]])
@@ -109,7 +109,10 @@ def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
 
 @kernel(float64(MOTION_TYPE, int64))
 def local_error(m: Any, component: int) -> float:
-    """The error of one component in a step, over the step: of order seven, from those of order three and five."""
+    """The error of one component in a step, over the step: of order seven, from those of order three and five.
+
+    e_5²/√(e_5² + e_3²/100), each e a sum of weighted slopes; of DOPRI5 |e| itself.
+    """
     third, fifth, pair = 0.0, 0.0, m.pair
     for j in range(USED[pair]):
         third += THIRD[pair, j] * m.slopes[j, component]
@@ -122,7 +125,10 @@ def local_error(m: Any, component: int) -> float:
 
 @kernel(void(MOTION_TYPE, float64))
 def make_continuous(m: Any, h: float) -> None:
-    """Coefficients of the continuous solution, from the slopes and both ends of a step h."""
+    """Coefficients of the continuous solution, from the slopes and both ends of a step h.
+
+    p_0 is the change, p_1 = h k_first - p_0, p_2 = 2 p_0 - h (k_first + k_last), and the others are h Σ D k.
+    """
     pair = m.pair
     for i in range(4):
         first, last = h * m.slopes[0, i], h * m.slopes[END_STAGE, i]
@@ -139,7 +145,10 @@ def make_continuous(m: Any, h: float) -> None:
 
 @kernel(float64(MOTION_TYPE, int64, float64))
 def interpolated(m: Any, component: int, theta: float) -> float:
-    """One component at the part theta of the step that the continuous solution belongs to."""
+    """One component at the part theta of the step that the continuous solution belongs to.
+
+    u = u_0 + θ (p_0 + (1 - θ) (p_1 + θ (p_2 + (1 - θ) (p_3 + …)))).
+    """
     total, rest = 0.0, 1.0 - theta
     for p in range(TERMS[m.pair] - 1, -1, -1):
         total = (total + m.powers[p, component]) * (theta if p % 2 == 0 else rest)
@@ -148,7 +157,11 @@ def interpolated(m: Any, component: int, theta: float) -> float:
 
 @kernel(float64(MOTION_TYPE, int64))
 def reach(m: Any, component: int) -> float:
-    """A bound of how far one component of the continuous solution gets from the begin of its step."""
+    """A bound of how far one component of the continuous solution gets from the begin of its step.
+
+    |p_0| + |p_1|/4 + 4 |p_2|/27 + Σ |p_k|/16: the largest sizes of θ, θ(1 - θ), θ²(1 - θ), and of products of
+    four.
+    """
     far = abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0
     far += abs(m.powers[2, component]) * 4.0 / 27.0
     for p in range(3, TERMS[m.pair]):

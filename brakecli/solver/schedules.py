@@ -52,7 +52,7 @@ def segment(s: Schedule, t: float) -> int:
 
 @kernel(float64(KNOTS, float64))
 def value_at(s: Schedule, t: float) -> float:
-    """Value at time t (s)."""
+    """Value at time t (s): v_k + s_k (t - t_k) behind the knot k, with its value and slope."""
     k = segment(s, t)
     if k < 0:
         return s[0].value  # type: ignore[no-any-return]
@@ -68,7 +68,10 @@ def slope_at(s: Schedule, t: float) -> float:
 
 @kernel(types.UniTuple(float64, 2)(KNOTS, float64, float64))
 def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
-    """Integral from 0 to t + t_low, as a sum of two doubles; t_low may be of any size, beyond a knot as well."""
+    """Integral from 0 to t + t_low, as a sum of two doubles; t_low may be of any size, beyond a knot as well.
+
+    It is I_k + (v_k + s_k τ/2) τ at the time τ behind the knot k.
+    """
     t, t_low = two_sum(t, t_low)
     k = max(segment(s, t), 0)
     slope, slope_low = s[k].slope, s[k].slope_low

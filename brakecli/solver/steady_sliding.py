@@ -50,7 +50,7 @@ class SteadySliding:
 
 @kernel(void(float64, vector, vector, LAYER, vector))
 def add_places(y: float, places: Floats, weights: Floats, layer: Layer, sums: Floats) -> None:
-    """Add force, stiffness and touching part at places of the wheel, with their weights."""
+    """Add force, stiffness and touching part at places of the wheel, Σ w_i F(x_i), with their weights."""
     layer = borrowed(layer)
     contact = layer.contact
     for i in range(places.size):

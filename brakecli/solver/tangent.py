@@ -19,15 +19,7 @@ import numpy as np
 from numba import float64, int64, void
 
 from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.records import (
-    BESIDE,
-    COEFFICIENTS,
-    PARTS,
-    PROBLEM_TYPE,
-    TANGENT_TYPE,
-    Beside,
-    Coefficients,
-)
+from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, TANGENT_TYPE, Beside, Coefficients
 
 BATCHES = 8
 """Batches of the parts of the second half of a run."""
@@ -89,7 +81,7 @@ def kept(needed: float, bound: float) -> float:
     """The part of a disturbance of the sliding velocity that is left as the shoe comes to the wheel's velocity.
 
     `needed` is the friction force (N) that it takes to stay there, `bound` the one that there is. Accelerations
-    before and behind are as |needed| + bound and |needed| - bound.
+    before and behind are as |needed| + bound and |needed| - bound, and the part is their ratio, at least 0.
     """
     return max(abs(needed) - bound, 0.0) / (abs(needed) + bound) if bound > 0.0 else 1.0
 
@@ -112,7 +104,11 @@ def meet(beside: Beside, part: float, theta: float, h: float, lag: int) -> None:
 
 @kernel(void(COEFFICIENTS, BESIDE, PROBLEM_TYPE, float64, float64, float64))
 def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: float, tangential: float) -> None:
-    """The minimisation of a step, differentiated: velocities and normal force of the disturbance."""
+    """The minimisation of a step, differentiated: velocities and normal force of the disturbance.
+
+    In slip a11 δd + a12 δe = δg1 - side φ δF and a12 δd + a22 δe = δg2 + δF; in stick δd = 0. In both δF = ∂F_y/∂x
+    δx + ∂F_y/∂y δy.
+    """
     b, grip = beside.problem, -side * c.phi
     a_11, a_12, a_22 = of.a_11, of.a_12, of.a_22
     if side == 0.0:
@@ -128,7 +124,10 @@ def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: floa
 
 @kernel(float64(TANGENT_TYPE, int64, int64))
 def renew(t: Any, number: int, samples: int) -> float:
-    """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by."""
+    """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by.
+
+    The square of its size is rate² (x² + y²) + v_x² + v_y².
+    """
     size = math.sqrt(t.rate * t.rate * (t.x * t.x + t.y * t.y) + (t.v_x * t.v_x + t.v_y * t.v_y))
     if number > 0:
         t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, LEAST), MOST))

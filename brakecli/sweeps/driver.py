@@ -37,15 +37,13 @@ LARGEST_TASK = 1000  # points, for up to a hundred workers; in proportion for mo
 class TaskQueue:
     """Cuts what is not finished into tasks, of a size by the time that units have taken so far."""
 
-    def __init__(
-        self, finished: NDArray[np.bool_], size: int | None, order: int = 1, workers: int = 1, least: int = 1
-    ) -> None:
-        """Queue what is not finished; `size` fixes that of the tasks, `order` = -1 begins at the end.
+    def __init__(self, finished: NDArray[np.bool_], size: int | None, workers: int = 1, least: int = 1) -> None:
+        """Queue what is not finished; `size` fixes that of the tasks.
 
         Units that are computed side by side come `least` at a time: fewer would take as long.
         """
         edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
-        self._tasks = deque([Task(first, end - first) for first, end in edges][::order])
+        self._tasks = deque([Task(first, end - first) for first, end in edges])
         self._left = sum(task.size for task in self._tasks)
         self._size, self._least, self._task_seconds = size, least, max(TASK_SECONDS, workers / TASKS_A_SECOND)
         self._part_of_rest = PART_OF_REST / workers
@@ -118,7 +116,6 @@ def sweep(
     *,
     force: bool,
     task_size: int | None = None,
-    order: int = 1,
     begin: Callable[[Estimate, int], None] = lambda found, resumed: None,
     progress: Callable[[int, int], None] = lambda done, failed: None,
     write: Callable[[ResultFile, SweepReport, Journal], None] = write,
@@ -137,7 +134,7 @@ def sweep(
         with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = journal.done
             begin(found, resumed)
-            queue = TaskQueue(journal.finished, task_size, order, engine.workers, found.together)
+            queue = TaskQueue(journal.finished, task_size, engine.workers, found.together)
             notes = _compute(engine, journal, queue, progress)
             if missing := int((~journal.finished).sum()):
                 lost = f"{output}: {missing} of {plan.units} points or lines are missing"

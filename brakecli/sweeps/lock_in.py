@@ -17,9 +17,10 @@ from brakecli.case.read import LoadedCase
 from brakecli.case.roughness import Records
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.files import fields
+from brakecli.files import stability_fields as fields
 from brakecli.files.atomic import new_output
-from brakecli.files.field import Field, values_of
+from brakecli.files.field import Field, labelled, values_of
+from brakecli.files.fields import TEXT
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
 from brakecli.solver.motion import Counted
@@ -101,7 +102,7 @@ def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None
         for field in (*fields.VARIED, *fields.MODES):
             dims, kind = ((axis.name, "mode"), "f8") if field in fields.MODES else ((axis.name,), field.kind)
             column = [entry[field.name] for entry in found.entries]
-            data = [text or "" for text in column] if kind == fields.TEXT else column
+            data = [text or "" for text in column] if kind == TEXT else column
             result.column(replace(field, kind=kind), dims, data)
         result.commit()
 
@@ -109,16 +110,12 @@ def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None
 def _csv(found: LockIn) -> str:
     """A line for each value; what does not exist is empty."""
     key = ", ".join(found.parameters)
-    columns = {_head(key, unit(found.parameters[0])): [entry["value"] for entry in found.entries]}
+    columns = {labelled(key, unit(found.parameters[0])): [entry["value"] for entry in found.entries]}
     for field in fields.VARIED:
-        columns[_head(field.name, field.units)] = [entry[field.name] for entry in found.entries]
+        columns[labelled(field.name, field.units)] = [entry[field.name] for entry in found.entries]
     for field, mode in ((field, mode) for field in fields.MODES for mode in (1, 2)):
         values = [entry[field.name][mode - 1] for entry in found.entries]
-        columns[_head(f"{field.name} of mode {mode}", field.units)] = values
+        columns[labelled(f"{field.name} of mode {mode}", field.units)] = values
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])
     return stream.getvalue()
-
-
-def _head(name: str, units: str) -> str:
-    return name if units in ("", "1") else f"{name} ({units})"

@@ -108,8 +108,9 @@ class Plan:
                 value = settings.get(path)
                 if each["type"] == "int_type" and isinstance(value, float) and value.is_integer():
                     return self.case({**settings, path: int(value)})  # a range holds floats
-            problems = [replace(each, source="the point") for each in wording.problems(error, Case)]
-            raise CaseError(problems) from None
+            raise CaseError(
+                [replace(each, source="the point") for each in wording.problems(error, Case)]
+            ) from None
 
     def problems(self, settings: Settings) -> tuple[Problem, ...]:
         """What is wrong with these values."""
@@ -168,8 +169,16 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
     if sweep.points is not None:
         listed = read_listed(folder / sweep.points, name, lines.get(("points",), 0))
         if sweep.critical is not None and key_path(sweep.critical.parameter) in map(key_path, listed.keys):
-            remedy = "look for another parameter, or leave that column out"
-            raise CaseError([Problem(("critical", "parameter"), "is set by a column of points", remedy, name)])
+            raise CaseError(
+                [
+                    Problem(
+                        ("critical", "parameter"),
+                        "is set by a column of points",
+                        "look for another parameter, or leave that column out",
+                        name,
+                    )
+                ]
+            )
     return _checked(sweep, text, name, base, listed)
 
 

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.case.case import SETTLED, Case
+from brakecli.case.case import Case
+from brakecli.case.parts import SETTLED
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema

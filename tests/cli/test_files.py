@@ -15,7 +15,7 @@ import pytest
 from brakecli.about import __version__
 from brakecli.case.read import parse_case
 from brakecli.files import fields
-from brakecli.files.contents import Difference, difference
+from brakecli.files.contents import INFO, Difference, difference
 from brakecli.files.read import open_result
 from brakecli.plots import two
 from brakecli.runs.run import run
@@ -270,7 +270,7 @@ def test_an_export_is_replaced_only_by_force(folder: Path, tmp_path: Path) -> No
 
 def test_info_tells_what_a_file_holds_and_what_made_it(folder: Path) -> None:
     found = brakecli("info", "a.h5", "--json", cwd=folder).json
-    assert [*found] == ["command", *(field.name for field in fields.INFO)]
+    assert [*found] == ["command", *(field.name for field in INFO)]
     assert (found["kind"], found["status"], found["title"], found["whole"]) == ("run", "done", "Tiny", True)
     assert found["bytes"] == (folder / "a.h5").stat().st_size
     assert found["versions"]["brakecli"] == __version__

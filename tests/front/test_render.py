@@ -6,6 +6,7 @@ import pytest
 
 from brakecli.files import fields
 from brakecli.files.field import Field, integer, ratio
+from brakecli.files.stability_fields import SCATTER
 from brakecli.front.render import TERMINAL, text_of
 from brakecli.reports.blocks import PAGE
 
@@ -45,7 +46,7 @@ def test_rows_leave_out_what_does_not_exist_and_name_no_codes() -> None:
 
 
 def test_every_declared_part_of_the_time_and_flag_is_read_as_such() -> None:
-    known = [each for table in (fields.VERDICT, fields.RUN, fields.POINT, fields.SCATTER) for each in table]
+    known = [each for table in (fields.VERDICT, fields.RUN, fields.POINT, SCATTER) for each in table]
     for each in known:
         if "(0, 1)" in each.meaning:
             assert TERMINAL.field(each, 1) == "yes", each.name

@@ -219,8 +219,8 @@ def test_a_cache_that_others_may_write_is_not_used(cache: Path, tmp_path: Path) 
 TROUBLE = """
 from brakecli.solver import compiling
 compiling.set_notice(lambda trouble: print("trouble:", trouble))
-from brakecli.solver import compile
-compile.PATIENCE = 0.1
+from brakecli.solver import kernel_cache
+kernel_cache.PATIENCE = 0.1
 from brakecli.solver import friction
 """
 

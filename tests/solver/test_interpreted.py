@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import config
+from brakecli.solver.kernel_cache import config
 
 SCHEMES = ("two-layer", "three-layer", "event-driven")
 EVALUATORS = ("closed-form", "midpoint", "exact", "auto")

@@ -124,22 +124,21 @@ def deaf(plan: Plan, first: int, count: int) -> bytes:
 
 
 class Inline(Engine):
-    """An engine without workers, which takes `limit` tasks and is then interrupted."""
+    """An engine without workers, which takes `limit` tasks and is then interrupted; backwards with `order` -1."""
 
     workers = 1
 
-    def __init__(self, plan: Plan, compute: Compute, limit: int | None = None) -> None:
-        self._plan, self._compute, self._limit = plan, compute, limit
+    def __init__(self, plan: Plan, compute: Compute, limit: int | None = None, order: int = 1) -> None:
+        self._plan, self._compute, self._limit, self._order = plan, compute, limit, order
 
     def __exit__(self, *error: object) -> None:
         pass
 
     def run(self, next_task: NextTask) -> Iterator[Finished]:
-        done = 0
-        while (task := next_task()) is not None:
+        tasks = iter(next_task, None)
+        for done, task in enumerate(tasks if self._order > 0 else [*tasks][::-1]):
             if done == self._limit:
                 raise KeyboardInterrupt
-            done += 1
             yield Finished(task, self._compute(self._plan, task.first, task.size), 0.1)
 
 
@@ -147,7 +146,8 @@ def inline(
     loaded: LoadedSweep, output: Path, compute: Compute = quick, limit: int | None = None, **options: Any
 ) -> SweepReport:
     """Sweep in this process."""
-    return sweep(loaded, output, Inline(loaded.plan, compute, limit), **({"force": False} | options))
+    engine = Inline(loaded.plan, compute, limit, options.pop("order", 1))
+    return sweep(loaded, output, engine, **({"force": False} | options))
 
 
 def interrupted(loaded: LoadedSweep, output: Path, compute: Compute = quick, **options: Any) -> None:

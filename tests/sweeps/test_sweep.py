@@ -429,8 +429,6 @@ def test_only_what_is_missing_is_queued_and_lost_units_come_again_one_by_one() -
     assert queue.retry(Task(6, 2))
     assert [queue.next_task() for _ in range(3)] == [Task(6, 1, True), Task(7, 1, True), None]
     assert not queue.retry(Task(6, 1, True))
-    backwards = TaskQueue(finished, 2, -1)
-    assert [backwards.next_task() for _ in range(2)] == [Task(6, 2), Task(8, 2)]
 
 
 def test_a_record_holds_text_whole_or_cut_between_characters() -> None:

@@ -14,8 +14,9 @@ import tomli_w
 import xarray as xr
 from scipy.integrate import solve_ivp
 
-from brakecli.branches.answers import Answers, told_apart
+from brakecli.branches.answers import Answers
 from brakecli.branches.bar import Bound
+from brakecli.branches.stable_parts import told_apart
 from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.read_off import explored, on_waves

@@ -59,7 +59,7 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
 
 @kernel(EVALUATE)
 def full_press(x: float, y: float, layer: Layer) -> None:
-    """`full_contact` for a run that takes no derivatives by x: normal force, stiffness and fraction."""
+    """`full_contact` for a run that takes no derivatives by x: normal force, stiffness 2ak and fraction 1."""
     layer = borrowed(layer)
     pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
     length, n, omega_at = 2.0 * pad.half_length, pad.wheel_terms, pad.wheel_at + pad.wheel_terms

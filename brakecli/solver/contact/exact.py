@@ -45,7 +45,7 @@ _FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it 
 
 @kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector), inlined=False)
 def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, float, float]:
-    """The gap f2 - f1 - y at xi, m, and its first three derivatives."""
+    """The gap f2 - f1 - y = Σ g sin(ωξ + ψ) - y at xi, m, and its first three derivatives."""
     sines, cosines = waves[_SINE * n : (_SINE + 1) * n], waves[_COSINE * n : (_COSINE + 1) * n]
     for i in range(n):  # several waves at a time, whereas sums keep their order
         sines[i], cosines[i] = sine_cosine(waves[n + i] * xi + waves[2 * n + i])
@@ -83,7 +83,7 @@ def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Fl
 def _followed(left: float, right: float, xi: float, y: float, n: int, waves: Floats) -> tuple[float, float]:
     """The root of a gap that is monotone on [left, right], by Halley's iteration from xi, and the slope there.
 
-    NaN where it does not lie inside, or is not found at once.
+    ξ becomes ξ - g g'/(g'² - g g''/2). NaN where the root does not lie inside, or is not found at once.
     """
     small = _FOLLOWED * (right - left)
     for _ in range(6):
@@ -106,7 +106,7 @@ def _sinc_of(sine: float, z: float) -> float:
 
 @kernel(float64(float64))
 def _sinc_near_zero(z: float) -> float:
-    """sin(z)/z up to half a radian, by its series."""
+    """sin(z)/z up to half a radian, by its series 1 - z²/3! + z⁴/5! - …"""
     q = z * z
     series = 1.0 - q / 110.0 * (1.0 - q / 156.0)
     return 1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * series)))
@@ -114,7 +114,11 @@ def _sinc_near_zero(z: float) -> float:
 
 @kernel(void(float64, float64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
 def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
-    """Add the closed integrals of a touching interval, without the factor k."""
+    """Add the closed integrals of a touching interval, without k: ∫ gap, its length, ∫ f2', ∫ gap²/2, ∫ gap f2'.
+
+    A wave over the length L about the middle ξ_m has the integral L sinc(ωL/2) g sin(ωξ_m + ψ); products of two
+    waves have two such integrals, of the sum and of the difference of their arguments.
+    """
     wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
     length, middle = right - left, 0.5 * (left + right)
     at_sine, at_cosine, at_half = _SINE * n, _COSINE * n, _HALF * n

@@ -19,7 +19,8 @@ from brakecli.solver.records import EVALUATE, LAYER, Layer
 @kernel(types.UniTuple(float64, 6)(float64, float64, vector, vector), fastmath=FAST)
 def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float, float, float, float, float]:
     """Sums over the touching nodes of: gap, 1, rise of f2 across the cell, gap², gap times rise; and the number of
-    nodes where the gap is within reach of zero. The rise is that of a polynomial through six neighbours.
+    nodes where the gap f2 - f1 - y is within reach of zero. The rise is that of a polynomial through six
+    neighbours, (45 (f_1 - f_-1) - 9 (f_2 - f_-2) + f_3 - f_-3)/60.
     """
     force, touching, rise, square, work, near = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for j in range(f1.size):
@@ -38,7 +39,7 @@ def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float,
 
 @kernel(types.UniTuple(float64, 2)(float64, vector, vector), fastmath=FAST)
 def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
-    """Sums over the touching nodes of: gap, 1."""
+    """Sums over the touching nodes, where f2 - f1 - y > 0, of: gap, 1."""
     force, touching = 0.0, 0.0
     for j in range(f1.size):
         gap = f2[j + 3] - f1[j] - y
@@ -51,7 +52,7 @@ def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
 
 @kernel(void(vector, vector, vector, float64, float64), fastmath=FAST)
 def _add_parts(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> None:
-    """`_add_wave`, with what is even in ξ and what is odd apart."""
+    """Add the wave s g cos(ωξ) + c g sin(ωξ), with s = sin ψ and c = cos ψ: its even part and its odd part."""
     for j in range(even.size):
         even[j] += s * table[j + TILE]
         odd[j] += c * table[j]
@@ -134,7 +135,10 @@ def left_out(y: float, layer: Layer) -> float:
 
 @kernel(EVALUATE)
 def press(x: float, y: float, layer: Layer) -> None:
-    """`evaluate` where normal force, stiffness and fraction are enough; the same but for rounding."""
+    """`evaluate` where normal force, stiffness and fraction are enough; the same but for rounding.
+
+    F_y = k 2a/n Σ gap over the touching nodes, (2), and -∂F_y/∂y = k 2a/n times their number.
+    """
     layer = borrowed(layer)
     pad, contact = layer.pad, layer.contact
     if layer.window.rows > 0:

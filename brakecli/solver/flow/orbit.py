@@ -17,23 +17,11 @@ from numba import float64, int64, types, void
 
 from brakecli.solver.compile import kernel
 from brakecli.solver.flow.smooth import DONE, MOST_EVENTS, MOST_STEPS, PATH_TYPE, flow, step, zero_of_velocity
-from brakecli.solver.records import (
-    BELT,
-    COEFFICIENTS,
-    FLOW_TYPE,
-    PHASES,
-    SIZE,
-    TERMS,
-    V_X,
-    V_Y,
-    Coefficients,
-    X,
-    Y,
-    record,
-)
+from brakecli.solver.motions import BELT, FLOW_TYPE, PHASES, SIZE, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.records import COEFFICIENTS, Coefficients, record
 from brakecli.solver.roughness import TWO_PI
-from brakecli.solver.schemes.piecewise_exact import look
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT
+from brakecli.solver.schemes.piecewise_exact.steps import look
 from brakecli.solver.schemes.piecewise_exact.switch import place
 
 _REACH = 0.1  # of the size of a cycle: step of Newton's iteration beyond which it may lead elsewhere
@@ -95,8 +83,8 @@ def note_event(path: Any, o: Any, phase: int) -> None:
 def _returned(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """From `point` over a period, and on to the section: the return in `kept`, and M; 0 where there is none.
 
-    The rest of the way to the section is followed along the velocity. It vanishes as Newton's iteration closes the
-    orbit, which is closed only when it has: M is that of the time flown.
+    The rest of the way to the section, -ẋ/ẍ, is followed along the velocity. It vanishes as Newton's iteration
+    closes the orbit, which is closed only when it has: M is that of the time flown.
     """
     m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = o.point[0], o.point[1], 0.0, o.point[2]
     if flow(c, m, path, o.period, 1) != DONE or path.velocity[V_X] >= 0.0:
@@ -172,7 +160,7 @@ def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
 
 @kernel(float64(PURSUIT_TYPE, float64, float64, float64))
 def sizes(o: Any, x: float, y: float, v_y: float) -> float:
-    """A distance on the section, in sizes of the cycle."""
+    """A distance on the section over the amplitude of the cycle: the largest of |x|, |y| and |v_y| T/2π."""
     return max(abs(x), abs(y), abs(v_y) * o.period / TWO_PI) / o.amplitude  # type: ignore[no-any-return]
 
 
@@ -193,7 +181,10 @@ def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
 def closed(c: Coefficients, m: Any, path: Any, o: Any) -> int:
-    """Find the orbit of `turns` falls near the last return; 0 where none is found that the motion comes to."""
+    """Find the orbit of `turns` falls near the last return; 0 where none is found that the motion comes to.
+
+    By Newton's method: the point moves by (I - M)⁻¹ (return - point).
+    """
     s, at, k = o.returns, o.point, o.turns
     for i in range(3):
         at[i] = s[0, i]

@@ -19,21 +19,10 @@ from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.flow.orbit import MOST_TURNS, PURSUIT, PURSUIT_TYPE, closed, note_event, sizes
 from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.smooth import MOST_EVENTS, MOST_STEPS, PATH, PATH_TYPE, step, zero_of_velocity
-from brakecli.solver.records import (
-    BELT,
-    COEFFICIENTS,
-    FLOW,
-    FLOW_TYPE,
-    LOAD,
-    SIZE,
-    V_X,
-    V_Y,
-    Coefficients,
-    X,
-    Y,
-    new,
-)
-from brakecli.solver.schemes.piecewise_exact import look, phases
+from brakecli.solver.motions import BELT, FLOW, FLOW_TYPE, LOAD, SIZE, V_X, V_Y, X, Y
+from brakecli.solver.records import COEFFICIENTS, Coefficients, new
+from brakecli.solver.schemes.piecewise_exact import phases
+from brakecli.solver.schemes.piecewise_exact.steps import look
 from brakecli.solver.schemes.piecewise_exact.switch import place
 from brakecli.solver.system import longest_step
 
@@ -48,7 +37,7 @@ _NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbi
 
 @kernel(void(FLOW_TYPE, PURSUIT_TYPE, float64), inlined=False)
 def _bound(m: Any, o: Any, seconds: float) -> None:
-    """How far from steady sliding a linear motion can come within some time: the sum of its modes."""
+    """How far from steady sliding a linear motion can come in a time t: Σ |a| exp(max(σ, 0) t) of its modes."""
     for k in range(3):
         o.bound[k] = 0.0
     for q in range(4):

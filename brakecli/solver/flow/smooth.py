@@ -20,24 +20,11 @@ from numba import float64, int64, void
 
 from brakecli.solver.automaton import OPEN, STICK
 from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.records import (
-    BELT,
-    COEFFICIENTS,
-    FLOW,
-    FLOW_TYPE,
-    LOAD,
-    MARGINS,
-    PHASES,
-    SIZE,
-    TERMS,
-    V_X,
-    Coefficients,
-    X,
-    new,
-    record,
-)
-from brakecli.solver.schemes.piecewise_exact import look, phases, whole
+from brakecli.solver.motions import BELT, FLOW, FLOW_TYPE, LOAD, MARGINS, PHASES, SIZE, TERMS, V_X, X
+from brakecli.solver.records import COEFFICIENTS, Coefficients, new, record
+from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event, root
+from brakecli.solver.schemes.piecewise_exact.steps import look, whole
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
 from brakecli.solver.system import System
 
@@ -115,7 +102,7 @@ def zero_of_velocity(m: Any, o: Any, sign: float) -> float:
 
 @kernel(float64(FLOW_TYPE, int64, int64))
 def _rate(m: Any, phase: int, i: int) -> float:
-    """The derivative by time of a component of the motion at `at`, in a phase."""
+    """The derivative by time of a component of the motion at `at`, in a phase: row i of A times it."""
     total = 0.0
     for k in range(SIZE):
         total += m.generator[phase, i, k] * m.at[k]
@@ -124,7 +111,7 @@ def _rate(m: Any, phase: int, i: int) -> float:
 
 @kernel(void(FLOW_TYPE, PATH_TYPE, float64), inlined=False)
 def _carry(m: Any, o: Any, part: float) -> None:
-    """Move the disturbances along a part of the last step."""
+    """Move the disturbances along a part of the last step: exp(A t) times them."""
     whole_step = part == 1.0
     for j in range(4):
         if whole_step:
@@ -143,7 +130,10 @@ def _carry(m: Any, o: Any, part: float) -> None:
 
 @kernel(int64(FLOW_TYPE, PATH_TYPE), inlined=False)
 def _jump(m: Any, o: Any) -> int:
-    """Take the disturbances through the event that has just been passed; 0 where it is only grazed."""
+    """Take the disturbances through the event that has just been passed; 0 where it is only grazed.
+
+    With the margin n z and the rates f and f' before and behind it, dz becomes dz + (f' - f) (n dz)/(n f).
+    """
     rate = 0.0
     for i in range(SIZE):
         m.at[i] = m.z[i]

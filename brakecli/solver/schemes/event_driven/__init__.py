@@ -11,8 +11,9 @@ from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import Floats, address, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
+from brakecli.solver.motions import MOTION, V_X, V_Y, X, Y
 from brakecli.solver.quantities import Failure
-from brakecli.solver.records import EVALUATE, MOTION, V_X, V_Y, Plant, Weights, X, Y, plant_type
+from brakecli.solver.records import EVALUATE, Plant, Weights, plant_type
 from brakecli.solver.runge_kutta import interpolated
 from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step

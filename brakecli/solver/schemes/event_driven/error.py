@@ -15,7 +15,8 @@ from brakecli.solver.automaton import OPEN, STICK, side_of
 from brakecli.solver.compile import kernel, stopped
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
-from brakecli.solver.records import DISTURBED, GRID, SPANS, STAGES, V_X, V_Y, Grid, X, Y
+from brakecli.solver.motions import STAGES, V_X, V_Y, X, Y
+from brakecli.solver.records import DISTURBED, GRID, SPANS, Grid
 from brakecli.solver.runge_kutta import END_STAGE
 from brakecli.solver.schemes.event_driven import phases
 from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
@@ -36,7 +37,7 @@ _MUCH = 0.3
 
 @kernel(void(SHOE, float64), inlined=False)
 def _ahead(p: Shoe, tau: float) -> None:
-    """Carry errors and disturbance by exp(A τ), with the contact at the last place."""
+    """Carry errors and disturbance by exp(A τ) e = Σ (A τ)^n e/n!, with the contact at the last place."""
     c, m = p.c, p.motion
     grip, stiffness, tangential = -side_of(m.phase) * c.phi, m.touch[_AT, 0], m.touch[_AT, 1]
     free, whole = 0.0 if m.phase == STICK else 1.0 / c.m, 1.0 / c.m
@@ -77,7 +78,10 @@ def _beyond(p: Shoe, grid: Grid) -> int:
 
 @kernel(void(SHOE, float64, GRID), inlined=False)
 def grow(p: Shoe, h: float, grid: Grid) -> None:
-    """Carry error and disturbance along the step that has been made, and add what the step makes of its own."""
+    """Carry error and disturbance along the step that has been made, and add what the step makes of its own.
+
+    At each place of Gauss's rule that is its share of u' - f(u), and of what the midpoint rule leaves out of F_y.
+    """
     c, m, t, step = p.c, p.motion, p.tangent, p.motion.step_done
     rule, light = m.pair, m.light
     m.light = 0

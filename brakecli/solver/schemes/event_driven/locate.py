@@ -6,7 +6,7 @@ from numba import float64, int64, types
 
 from brakecli.solver.automaton import HEIGHT, OPEN, STICK, side_of
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import V_X, Y
+from brakecli.solver.motions import V_X, Y
 from brakecli.solver.runge_kutta import reach
 from brakecli.solver.schemes.event_driven.phases import EPSILON, NEAR, SHOE, Shoe, margins, rounding
 
@@ -86,7 +86,10 @@ def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[fl
 
 @kernel(float64(SHOE, int64, float64, float64), inlined=False)
 def _depth(p: Shoe, which: int, h: float, root: float) -> float:
-    """How far below zero a margin would fall behind its root, if the phase went on: by a parabola; or infinity."""
+    """How far below zero a margin would fall behind its root, if the phase went on: by a parabola; or infinity.
+
+    With m_1 and m_2 at one and two distances before the root that is (2 m_1 - m_2/2)²/2(m_2 - 2 m_1).
+    """
     apart = 0.5 * min(root, 2.0 * _APART)
     one, two = margins(p, h, root - apart)[which], margins(p, h, root - 2.0 * apart)[which]
     fall, bend = 2.0 * one - 0.5 * two, two - 2.0 * one

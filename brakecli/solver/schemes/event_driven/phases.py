@@ -26,7 +26,8 @@ from brakecli.solver.automaton import (
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
-from brakecli.solver.records import COEFFICIENTS, V_X, V_Y, Coefficients, Drive, Layer, X, Y
+from brakecli.solver.motions import MOTION_TYPE, V_X, V_Y, X, Y
+from brakecli.solver.records import COEFFICIENTS, Coefficients, Drive, Layer
 from brakecli.solver.roughness import turn
 from brakecli.solver.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.schedules import integral_at, slope_at, value_at
@@ -49,7 +50,7 @@ class Shoe(NamedTuple):
     track: Any
 
 
-_CHANGED = [records.MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE, records.TANGENT_TYPE, records.TRACK_TYPE]
+_CHANGED = [MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE, records.TANGENT_TYPE, records.TRACK_TYPE]
 SHOE = types.NamedTuple([COEFFICIENTS, records.LAYER, *_CHANGED], Shoe)
 _evaluate_at = at_address(records.EVALUATE)
 _PAIR = types.UniTuple(float64, 2)
@@ -58,7 +59,7 @@ _TRIPLE = types.UniTuple(float64, 3)
 
 @kernel(_PAIR(COEFFICIENTS, float64, float64, float64, float64, float64))
 def resistance(c: Coefficients, load: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
-    """Forces of links and load against x and y: what friction and normal force work against."""
+    """Forces of links and load against x and y, (6) and (7): what friction and normal force work against."""
     return (
         c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta,  # Eq. (6)
         c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta,  # Eq. (7)
@@ -67,7 +68,7 @@ def resistance(c: Coefficients, load: float, x: float, y: float, v_x: float, v_y
 
 @kernel(_PAIR(SHOE), inlined=False)
 def rounding(p: Shoe) -> tuple[float, float]:
-    """Rounding in the tangential and in the normal balance of forces, N."""
+    """Rounding in the tangential and in the normal balance of forces, N: 4 ε times the sizes of their terms."""
     c, pad, m = p.c, p.layer.pad, p.motion
     x, y, v_x, v_y = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     load, normal = abs(m.load), 0.0
@@ -134,6 +135,7 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
 def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """(6)-(7) as equations of first order, and the powers of the energy account, `since` the begin of the step.
 
+    The powers are F_x U, -F_x (ẋ - U), ẋ b_xx ẋ + 2 ẋ b_xy ẏ + ẏ b_yy ẏ, Q_x ẋ + Q_y ẏ, and that of the roughness.
     In stick x and its velocity are the wheel's, whatever is given.
     """
     c, m = p.c, p.motion
@@ -161,7 +163,10 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
 
 @kernel(_TRIPLE(SHOE, float64, float64), inlined=False)
 def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
-    """The margins of the phase at the part theta of the step h; one that the phase does not have is 1."""
+    """The margins of the phase at the part theta of the step h; one that the phase does not have is 1.
+
+    In flight y - clear; otherwise clear - y, in slip side (ẋ - U), in stick φ F_y - needed and φ F_y + needed.
+    """
     c, m, since = p.c, p.motion, theta * h
     y = interpolated(m, Y, theta)
     if m.phase == OPEN:
@@ -193,7 +198,10 @@ def margin_slope(p: Shoe, which: int) -> float:
 
 @kernel(_PAIR(SHOE, *[float64] * 5), inlined=False)
 def cone(p: Shoe, since: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
-    """How far the force that stick takes is within the friction cone (N), and what the error moves that by."""
+    """How far the force that stick takes is within the friction cone (N), and what the error moves that by.
+
+    φ F_y - |needed|, and |δ needed| + φ |∂F_y/∂x δx + ∂F_y/∂y δy|.
+    """
     c, m, e, n = p.c, p.motion, p.tangent.error[0], p.tangent.error[1]
     against, _ = resistance(c, m.load + m.load_slope * since, x, y, v_x, v_y)
     d_x, d_y = e[X] + n[X], e[Y] + n[Y]

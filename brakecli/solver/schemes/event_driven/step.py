@@ -9,8 +9,9 @@ from brakecli.solver import runge_kutta
 from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.motions import MOTION_TYPE, POWERED, STAGES, V_X, V_Y, X, Y
 from brakecli.solver.quantities import BOUND, Failure
-from brakecli.solver.records import DRIVE, GRID, KNOTS, MOTION_TYPE, POWERED, STAGES, V_X, V_Y, Drive, Grid, X, Y
+from brakecli.solver.records import DRIVE, GRID, KNOTS, Drive, Grid
 from brakecli.solver.runge_kutta import END_STAGE, NODES, ORDER, USED, A
 from brakecli.solver.schedules import Schedule, segment
 from brakecli.solver.schemes.event_driven import phases
@@ -58,7 +59,11 @@ def _to_knot(s: Schedule, t: float) -> float:
 
 @kernel(float64(SHOE, float64))
 def _longest(p: Shoe, duration: float) -> float:
-    """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it."""
+    """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it.
+
+    2 rad over its bound of the angular frequency, √(stiffness/m), 4 over its bound of the decay rate, (b_xx +
+    b_yy)/m, and a part of the shortest wave over the sliding speed.
+    """
     c, m, pad = p.c, p.motion, p.layer.pad
     stiffness = (1.0 + c.phi) * (2.0 * pad.half_length * pad.k) if m.phase != OPEN else 0.0
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + stiffness  # of the largest eigenvalue of the stiffness
@@ -98,7 +103,8 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
 def _defect(p: Shoe, h: float) -> float:
     """By how much the continuous solution misses (6)-(7) inside a step, over what the tolerance leaves it.
 
-    The error estimate is a linear functional of the slopes, which vanishes for a kink at certain places of a step.
+    It is |du/dθ - h f(u)|. The error estimate is a linear functional of the slopes, which vanishes for a kink at
+    certain places of a step.
     """
     m, worst = p.motion, 0.0
     along, across = phases.rounding(p)
@@ -185,7 +191,7 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
 
 @kernel(float64(MOTION_TYPE, int64))
 def _passed(m: Any, item: int) -> float:
-    """A work of the step that has been made, over its length."""
+    """A work of the step that has been made, over its length: Σ A_end,s P_s over the powers at its stages."""
     total = 0.0
     for stage in range(USED[m.pair]):
         total += A[m.pair, END_STAGE, stage] * m.work_rates[stage, item]
@@ -196,7 +202,7 @@ def _passed(m: Any, item: int) -> float:
 def _meet(p: Shoe) -> None:
     """Note where in the step that has been made a rough pad comes to the wheel or leaves it.
 
-    A contact that vanishes has a force that grows with its age to the power 3/2.
+    A contact that vanishes has a force that grows with its age to the power 3/2, so that its age is 3/2 F/|dF/dt|.
     """
     m, stage, meets = p.motion, END_STAGE, p.motion.touch[END_STAGE, 0] > 0.0
     x, y, v_x, v_y, since = m.end[X], m.end[Y], m.end[V_X], m.end[V_Y], m.step_done

@@ -8,59 +8,45 @@ steps end on the grid of samples. Nothing is smoothed, and nothing is passed ove
 import math
 from typing import Any
 
-from numba import float64, int64, types, void
+from numba import float64, int64, void
 
 from brakecli.solver import own_steps
 from brakecli.solver.automaton import OPEN, SLIDING, STICK, anchored, carried, counted, side_of, stalled
 from brakecli.solver.compile import Floats, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
-from brakecli.solver.quantities import BOUND, Failure
-from brakecli.solver.records import (
-    AHEAD,
+from brakecli.solver.motions import (
     BELT,
     BELT_SLOPE,
-    COEFFICIENTS,
-    COUNTS_TYPE,
     FLOW,
     FLOW_TYPE,
     LOAD,
     LOAD_SLOPE,
-    MARGINS,
     SIZE,
-    TANGENT_TYPE,
     TERMS,
-    TRACK_TYPE,
     V_X,
     V_Y,
-    Coefficients,
-    Plant,
-    Weights,
     X,
     Y,
-    plant_type,
 )
+from brakecli.solver.quantities import BOUND, Failure
+from brakecli.solver.records import COUNTS_TYPE, Plant, Weights, plant_type
 from brakecli.solver.schedules import integral_at, segment, slope_at, value_at
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event
 from brakecli.solver.schemes.piecewise_exact.phases import add_works
+from brakecli.solver.schemes.piecewise_exact.steps import carry_part, disturb, look, meet, note_turn, whole
 from brakecli.solver.schemes.piecewise_exact.switch import place, switch
-from brakecli.solver.tangent import kept, renew
-from brakecli.solver.track import enter, mark, put, turned
+from brakecli.solver.tangent import renew
+from brakecli.solver.track import enter, mark
 
 STATE = FLOW
 LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
 begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weighted_time
 mechanical_energy = own_steps.mechanical_energy
 
-_FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
-_ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
-_NEAR = 0.03  # part of a step by which an iteration of third order may move a turning point at last
-_ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
-Four = tuple[float, float, float, float]
-_FOUR = types.UniTuple(float64, 4)
 _PLANT = plant_type(FLOW)
 hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
 _NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
@@ -71,145 +57,6 @@ def order(s: Weights, start: str) -> int:
     return TERMS - 1
 
 
-@kernel(void(FLOW_TYPE))
-def _ahead(m: Any) -> None:
-    """The matrix of a step times the motion, in `after`; a tree of sums has less latency than a loop."""
-    a, z = m.now, m.z
-    z_0, z_1, z_2, z_3, z_4, z_5, z_6, z_7 = z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7]
-    for k in range(AHEAD):
-        one, two = a[0, k] * z_0 + a[1, k] * z_1, a[2, k] * z_2 + a[3, k] * z_3
-        three, four = a[4, k] * z_4 + a[5, k] * z_5, a[6, k] * z_6 + a[7, k] * z_7
-        m.after[k] = (one + two) + (three + four)
-
-
-@kernel(void(FLOW_TYPE))
-def _round(m: Any) -> None:
-    """Add a bound of the rounding of a step to the error, with the signs with which it does most harm."""
-    a, x, y, v_x, v_y, belt, load = m.now, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], m.z[BELT], m.z[LOAD]
-    for i in range(4):
-        place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
-        drive = abs(a[BELT, i] * belt) + abs(a[LOAD, i] * load)
-        m.error[i] += math.copysign(_ROUNDING * (place + drive), m.error[i])
-
-
-@kernel(void(FLOW_TYPE))
-def _carry(m: Any) -> None:
-    """Move the error along a whole step, which has a rounding error of its own."""
-    a, x, y, v_x, v_y = m.now, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
-    for i in range(4):
-        m.error[i] = (a[0, i] * x + a[1, i] * y) + (a[2, i] * v_x + a[3, i] * v_y)
-    _round(m)
-
-
-@kernel(int64(FLOW_TYPE, float64), inlined=False)
-def whole(m: Any, h: float) -> int:
-    """Take a whole step and return 1, unless a margin runs out in it or may do so.
-
-    A margin that falls at first and rises at last is lowest inside, and not below where its tangents at both ends
-    cross. It does not fall but by rounding where a shoe breaks loose: then it begins at zero, and without a slope.
-    """
-    _ahead(m)
-    for k in range(4, 4 + MARGINS):
-        fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
-        if m.after[k] < 0.0 or (fall < -_FLAT * rise < 0.0 and fall * m.after[k] > rise * (m.before[k] + fall)):
-            return 0
-    pair = 0
-    for i in range(SIZE):
-        for j in range(i + 1):
-            m.sums[pair] += m.z[i] * m.z[j]
-            pair += 1
-    m.waiting = 1
-    for i in range(4):
-        m.z[i] = m.after[i]
-    _carry(m)
-    m.z[BELT], m.z[LOAD] = m.z[BELT] + h * m.z[BELT_SLOPE], m.z[LOAD] + h * m.z[LOAD_SLOPE]
-    for k in range(AHEAD):
-        m.before[k] = m.after[k]
-    return 1
-
-
-@kernel(void(FLOW_TYPE, TANGENT_TYPE), inlined=False)
-def _disturb(m: Any, t: Any) -> None:
-    """Move the disturbance along a whole step."""
-    a, x, y, v_x, v_y = m.now, t.x, t.y, t.v_x, t.v_y
-    t.x = (a[0, 0] * x + a[1, 0] * y) + (a[2, 0] * v_x + a[3, 0] * v_y)
-    t.y = (a[0, 1] * x + a[1, 1] * y) + (a[2, 1] * v_x + a[3, 1] * v_y)
-    t.v_x = (a[0, 2] * x + a[1, 2] * y) + (a[2, 2] * v_x + a[3, 2] * v_y)
-    t.v_y = (a[0, 3] * x + a[1, 3] * y) + (a[2, 3] * v_x + a[3, 3] * v_y)
-
-
-@kernel(_FOUR(FLOW_TYPE, float64, *_FOUR), inlined=False)
-def _moved(m: Any, seconds: float, x: float, y: float, v_x: float, v_y: float) -> Four:
-    """A disturbance after a part of a step in the present phase."""
-    a, phase = m.generator, m.phase
-    moved_x, moved_y, moved_v_x, moved_v_y = x, y, v_x, v_y
-    for k in range(1, _ERROR_TERMS):
-        a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
-        a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y)
-        part = seconds / k
-        x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-        moved_x, moved_y, moved_v_x, moved_v_y = moved_x + x, moved_y + y, moved_v_x + v_x, moved_v_y + v_y
-    return moved_x, moved_y, moved_v_x, moved_v_y
-
-
-@kernel(void(FLOW_TYPE, TANGENT_TYPE, float64), inlined=False)
-def _carry_part(m: Any, t: Any, seconds: float) -> None:
-    """The same along a part of a step, at whose end the motion is."""
-    e = m.error
-    e[X], e[Y], e[V_X], e[V_Y] = _moved(m, seconds, e[X], e[Y], e[V_X], e[V_Y])
-    _round(m)
-    if t.on == 1:
-        t.x, t.y, t.v_x, t.v_y = _moved(m, seconds, t.x, t.y, t.v_x, t.v_y)
-
-
-@kernel(void(COEFFICIENTS, FLOW_TYPE, TANGENT_TYPE), inlined=False)
-def _meet(c: Coefficients, m: Any, t: Any) -> None:
-    """What becomes of the disturbance as the shoe comes to the velocity of the wheel."""
-    needed = 0.0
-    for i in range(SIZE):
-        needed += m.needed[i] * m.z[i]
-    t.v_x *= kept(needed, max(-c.phi * m.stiffness * m.z[Y], 0.0))
-
-
-@kernel(void(FLOW_TYPE, TRACK_TYPE, float64, float64, float64), inlined=False)
-def _turn(m: Any, track: Any, t: float, span: float, v_before: float) -> None:
-    """Note a turning point in the step over a span (s) that ends at time t (s), where the motion is.
-
-    Chebyshev's iteration from the secant on, on the series from the end back: mostly the series is needed once.
-    """
-    a, z, phase, kind = m.generator, m.z, m.phase, turned(track, m.z[V_X])
-    if kind < 0:
-        return
-    back = -span * z[V_X] / (z[V_X] - v_before) if z[V_X] * v_before <= 0.0 else 0.0
-    place = 0.0
-    for _ in range(6):
-        x, y, v_x, v_y, load, belt_slope = z[X], z[Y], z[V_X], z[V_Y], z[LOAD], z[BELT_SLOPE]
-        velocity, slope, bend, power, before = v_x, 0.0, 0.0, 1.0, 0.0
-        place = x
-        for k in range(1, _ERROR_TERMS):
-            a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (
-                a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y
-            )
-            a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (
-                a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y
-            )
-            a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
-            a_y += a[phase, V_Y, LOAD] * load
-            x, y, v_x, v_y = v_x, v_y, a_x, a_y
-            load, belt_slope = z[LOAD_SLOPE] if k == 1 else 0.0, 0.0
-            slope, bend = slope + power * v_x, bend + before * v_x
-            before, power = power, power * (back / k)
-            place, velocity = place + power * x, velocity + power * v_x
-        rest = -velocity / slope if abs(velocity) < span * abs(slope) else 0.0
-        rest -= 0.5 * bend * rest * rest / slope if rest != 0.0 else 0.0
-        rest = min(max(rest, -span - back), -back)
-        place += (velocity + 0.5 * slope * rest) * rest
-        back += rest
-        if abs(rest) <= _NEAR * span:
-            break
-    put(track, kind, t + back, place)
-
-
 @kernel(void(_PLANT, int64, float64), inlined=False)
 def _mark(p: Plant, number: int, t: float) -> None:
     """Make a mark at a sample."""
@@ -218,20 +65,6 @@ def _mark(p: Plant, number: int, t: float) -> None:
     store = 0.5 * m.stiffness * m.z[Y] * m.z[Y] if m.phase != OPEN else 0.0
     at = mark(p.track, p.work, number, p.grid.samples, t, store)
     at[0], at[1], at[2], at[3] = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
-
-
-@kernel(void(FLOW_TYPE), inlined=False)
-def look(m: Any) -> None:
-    """The matrix of the phase, the margins of the motion reached, and their slopes."""
-    for i in range(SIZE):
-        for k in range(AHEAD):
-            m.now[i, k] = m.margins[m.phase, i, k]
-    _ahead(m)
-    for i in range(SIZE):
-        for k in range(AHEAD):
-            m.now[i, k] = m.step[m.phase, i, k]
-    for k in range(AHEAD):
-        m.before[k] = m.after[k]
 
 
 @kernel(void(_PLANT, float64), inlined=False)
@@ -292,10 +125,10 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
         if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
             _count(m, p.counts)
             if p.tangent.on == 1:
-                _disturb(m, p.tangent)
+                disturb(m, p.tangent)
             tau += h
             if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
-                _turn(m, p.track, t + tau, h, v_x)
+                note_turn(m, p.track, t + tau, h, v_x)
             continue
         span = max(min(h - tau if to_sample == 1 else h, to_knot), 0.0)
         for i in range(SIZE):
@@ -305,9 +138,9 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
         if theta > 0.0:
             phases.take_part(p.c, m, p.work, span, theta)
             _count(m, p.counts)
-            _carry_part(m, p.tangent, theta * span)
+            carry_part(m, p.tangent, theta * span)
             if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
-                _turn(m, p.track, t + tau + theta * span, theta * span, v_x)
+                note_turn(m, p.track, t + tau + theta * span, theta * span, v_x)
         tau += theta * span
         if which != NO_EVENT:
             m.events_time, m.events = counted(m.events_time, m.events, t + tau, h)
@@ -317,7 +150,7 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
             before = m.phase
             switch(p.c, m, which, p.s.h)
             if p.tangent.on == 1 and which == SLIDING and before != OPEN and before != STICK:
-                _meet(p.c, m, p.tangent)
+                meet(p.c, m, p.tangent)
             if p.track.on == 1:
                 enter(p.track, m.phase, t + tau, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y])
             _anchor(p, t, tau)
@@ -380,9 +213,9 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         if m.beyond == 0.0 and t + h < m.knot and whole(m, h) == 1:
             _count(m, counts)
             if p.tangent.on == 1:
-                _disturb(m, p.tangent)
+                disturb(m, p.tangent)
             if p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0:
-                _turn(m, p.track, t + h, h, v_x)
+                note_turn(m, p.track, t + h, h, v_x)
         else:
             failure = _through(p, t, int(part + 1 == grid.per_sample))
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:

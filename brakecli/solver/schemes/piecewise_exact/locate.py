@@ -6,7 +6,7 @@ from numba import float64, int64, types
 
 from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import BELT, FLOW_TYPE, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.motions import BELT, FLOW_TYPE, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
 
 NO_EVENT = -1
 _EPSILON = 2.220446049250313e-16
@@ -17,7 +17,7 @@ _LOOKS = 12  # how often a margin that begins at zero is sought above it, each t
 
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
 def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
-    """A polynomial and its slope at a part of the span."""
+    """A polynomial Σ p_k θ^k and its slope at a part θ of the span."""
     of, q, value, slope, odd, odd_slope = m.polynomial, theta * theta, 0.0, 0.0, 0.0, 0.0
     for k in range(TERMS - 2, -1, -2):  # even and odd powers apart, which do not wait for each other
         slope, odd_slope = slope * q + value, odd_slope * q + odd
@@ -50,7 +50,7 @@ def root(m: Any, row: int, left: float, right: float) -> float:
 
 @kernel(types.UniTuple(float64, 3)(FLOW_TYPE, int64), inlined=False)
 def _follow(m: Any, which: int) -> tuple[float, float, float]:
-    """A margin on the series as a polynomial: its value and slope at the end, and what rounding does to it."""
+    """A margin on the series as a polynomial Σ (m z_k) θ^k: its value and slope at the end, and its rounding."""
     row, z, of = m.margins[m.phase, :, 4 + which], m.series, m.polynomial
     x, y, v_x, v_y = row[X], row[Y], row[V_X], row[V_Y]
     for k in range(TERMS):

@@ -11,10 +11,9 @@ from numba import float64, int64, types, void
 
 from brakecli.solver.automaton import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of
 from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.records import (
+from brakecli.solver.motions import (
     BELT,
     BELT_SLOPE,
-    COEFFICIENTS,
     FLOW_TYPE,
     LOAD,
     LOAD_SLOPE,
@@ -24,17 +23,26 @@ from brakecli.solver.records import (
     TERMS,
     V_X,
     V_Y,
-    WORK_TYPE,
-    Coefficients,
     X,
     Y,
 )
+from brakecli.solver.records import COEFFICIENTS, WORK_TYPE, Coefficients
 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
 """Gauss' rule over a step: as a step is a part of a period, exact to rounding for what is quadratic in z."""
 _POWERS = np.vander(np.append(_NODES, 1.0), TERMS, increasing=True)
 """Of the nodes, and of the end of the step."""
+
+
+@kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, *[float64] * 4))
+def acceleration(m: Any, phase: int, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
+    """A (x, y, v_x, v_y) along x and y in a phase: what links, dashpots and contact make of (6)-(7)."""
+    a = m.generator
+    return (
+        (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y),
+        (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y),
+    )
 
 
 @kernel(void(FLOW_TYPE, int64, float64), inlined=False)
@@ -45,8 +53,7 @@ def expand(m: Any, phase: int, span: float) -> None:
     z[1, BELT], z[1, LOAD] = span * z[0, BELT_SLOPE], span * z[0, LOAD_SLOPE]  # further terms are 0
     for k in range(1, TERMS):
         part = span / k
-        a_x = (a[phase, V_X, X] * x + a[phase, V_X, Y] * y) + (a[phase, V_X, V_X] * v_x + a[phase, V_X, V_Y] * v_y)
-        a_y = (a[phase, V_Y, X] * x + a[phase, V_Y, Y] * y) + (a[phase, V_Y, V_X] * v_x + a[phase, V_Y, V_Y] * v_y)
+        a_x, a_y = acceleration(m, phase, x, y, v_x, v_y)
         a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
         a_y += a[phase, V_Y, LOAD] * load
         x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
@@ -56,7 +63,7 @@ def expand(m: Any, phase: int, span: float) -> None:
 
 @kernel(void(FLOW_TYPE, float64))
 def reach(m: Any, theta: float) -> None:
-    """Put the motion at a part of the span of the series into `m.at`."""
+    """Put the motion at a part of the span of the series, Σ z_k θ^k, into `m.at`."""
     z, q = m.series, theta * theta
     for i in range(SIZE):  # the compiler makes one vector of them
         value = 0.0
@@ -122,13 +129,13 @@ def _unroll(m: Any, phase: int, h: float) -> None:
 
 @kernel(types.UniTuple(float64, 3)(COEFFICIENTS, float64, float64))
 def _rates(c: Coefficients, v_x: float, v_y: float) -> tuple[float, float, float]:
-    """The forces of the dashpots (N) on a velocity, and the velocity along Q."""
+    """The forces of the dashpots (N) on a velocity, and the velocity along Q: B v, and v_x sin β + v_y cos β."""
     return c.b_xx * v_x + c.b_xy * v_y, c.b_xy * v_x + c.b_yy * v_y, c.sin_beta * v_x + c.cos_beta * v_y
 
 
 @kernel(void(FLOW_TYPE, int64))
 def _sum_up(m: Any, node: int) -> None:
-    """The rows of exp(A t) at a node of Gauss' rule, or at the end of the step: the small terms first."""
+    """The rows of exp(A t) = Σ (t/h)^k (A h)^k/k! at a node of Gauss' rule or the end: the small terms first."""
     for i in range(4):
         for j in range(SIZE):
             total = 0.0
@@ -139,13 +146,13 @@ def _sum_up(m: Any, node: int) -> None:
 
 @kernel(float64(types.Array(float64, 1, "A"), int64, float64))
 def _driven(row: Floats, j: int, time: float) -> float:
-    """What one of U, Q and their slopes is worth in a row after a time: U and Q are integrals of slopes."""
+    """What U, Q or one of their slopes is worth in a row after a time: r_j, and t r_(j-1) as well for slopes."""
     return (row[j] if j > V_Y else 0.0) + (time * row[j - 1] if j in (BELT_SLOPE, LOAD_SLOPE) else 0.0)
 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
 def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
-    """The matrices of a phase for steps h, with exp(A h)."""
+    """The matrices of a phase for steps h: its margins M, their slopes h A' M, and exp(A h)' times all."""
     if m.made[phase] > 0:
         return
     m.made[phase] = 1
@@ -170,7 +177,10 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64, float64), inlined=False)
 def _make_works(c: Coefficients, m: Any, phase: int, h: float) -> None:
-    """The works of a step of a phase as forms in its first motion."""
+    """The works of a step of a phase as forms in its first motion, z' W z, by Gauss' rule.
+
+    They are the integrals of F_x U, F_x (U - ẋ), ẋ b_xx ẋ + 2 ẋ b_xy ẏ + ẏ b_yy ẏ, and Q_x ẋ + Q_y ẏ.
+    """
     m.made[phase] = 2
     r, pull, v_x, v_y, along, across = m.rows, m.factors[0], m.factors[1], m.factors[2], m.factors[3], m.factors[4]
     slides, w = 0.0 if phase == STICK else 1.0, m.works[phase]
@@ -200,7 +210,7 @@ def _make_works(c: Coefficients, m: Any, phase: int, h: float) -> None:
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, WORK_TYPE, float64, float64), inlined=False)
 def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> None:
-    """Move to a part of the span of the series, and add the works on the way."""
+    """Move to a part of the span of the series, and add the works on the way, as `_make_works` has them."""
     z = m.at
     for node in range(NODES):
         reach(m, theta * _NODES[node])
@@ -218,7 +228,7 @@ def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> 
 
 @kernel(void(COEFFICIENTS, FLOW_TYPE, WORK_TYPE, float64), inlined=False)
 def add_works(c: Coefficients, m: Any, work: Any, h: float) -> None:
-    """Add up the works of the whole steps that wait for it, all of the present phase."""
+    """Add up the works Σ W_ij Σ z_i z_j of the whole steps that wait for it, all of the present phase."""
     if m.waiting == 0:
         return
     if m.made[m.phase] < 2:

@@ -6,14 +6,15 @@ from numba import boolean, float64, int64, types, void
 
 from brakecli.solver.automaton import HEIGHT, OPEN, PULL, PUSH, STICK, UNDECIDED, following, held, sliding_phase
 from brakecli.solver.compile import kernel
-from brakecli.solver.records import BELT, COEFFICIENTS, FLOW_TYPE, SIZE, TERMS, V_X, V_Y, Coefficients, Y
+from brakecli.solver.motions import BELT, FLOW_TYPE, SIZE, TERMS, V_X, V_Y, Y
+from brakecli.solver.records import COEFFICIENTS, Coefficients
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import ROUNDING
 
 
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64))
 def _margin(m: Any, which: int) -> tuple[float, float]:
-    """A margin in stick (N), and by how much it may miss zero through rounding."""
+    """A margin in stick (N), its column times z, and by how much it may miss zero through rounding."""
     total, terms = 0.0, 0.0
     for i in range(SIZE):
         part = m.margins[STICK, i, 4 + which] * m.z[i]

@@ -1,0 +1,97 @@
+"""Around each call from Python: interruptions, what digests say, warnings, progress, and results as files."""
+
+import tempfile
+import threading
+import warnings
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import ExitStack, contextmanager, nullcontext
+from os import PathLike
+from pathlib import Path
+from typing import TYPE_CHECKING, TypeAlias
+
+from brakecli.errors import UsageError
+from brakecli.faces import in_python
+from brakecli.files.trust import readings
+from brakecli.stop import signals_shown
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from brakecli.solver.motion import Counted
+
+    Result: TypeAlias = str | PathLike[str] | xr.Dataset | xr.DataTree
+    Progress = bool | Callable[[str, int, int], None]
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """Let Ctrl-C end compiled code, too; other threads hear no signals."""
+    hears = threading.current_thread() is threading.main_thread()
+    with signals_shown() if hears else nullcontext(), in_python():
+        yield
+
+
+@contextmanager
+def readings_told(*, force_read: bool = False) -> Iterator[None]:
+    """Warn of results that no digest vouches for, and forget them at the end."""
+    import brakecli.accessor  # noqa: F401 - which xarray objects have from then on
+    from brakecli.case.roughness import arrays
+
+    said, before = list[str](), arrays.set({})
+    readings.begin(said.append, forced=force_read)
+    try:
+        yield
+    finally:
+        readings.begin()
+        arrays.reset(before)
+    warn(said, 5)  # the caller of who uses this block
+
+
+@contextmanager
+def telling_to(progress: "Progress") -> Iterator["Counted"]:
+    """What tells the progress: a function of the caller, or that of the commands."""
+    from brakecli.front.progress import telling
+
+    if callable(progress):
+        yield progress
+        return
+    with telling(not progress, first_line=1.0) as tell:
+        yield tell
+
+
+@contextmanager
+def target(output: "str | PathLike[str] | None", name: str = "result.h5") -> Iterator[Path]:
+    """Where a result goes: to a file that stays, or to one that does not."""
+    if output is not None:
+        if not isinstance(output, str | PathLike):
+            raise UsageError(f"output {output!r}: is no path; give one, or leave it out")
+        yield Path(output)
+        return
+    with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
+        yield Path(folder) / name
+
+
+@contextmanager
+def as_files(results: "Iterable[Result]", *names: str) -> Iterator[list[Path]]:
+    """Results as files: their own, or for those in memory one of these names, which goes with the block."""
+    import xarray as xr
+
+    from brakecli.files.as_xarray import stored
+
+    with ExitStack() as stack:
+        files = list[Path]()
+        for number, result in enumerate(results):
+            if isinstance(result, xr.Dataset | xr.DataTree):
+                name = names[number] if number < len(names) else f"{names[-1]}-{number + 1}"
+                files.append(stack.enter_context(stored(result, f"{name}.h5")))
+            elif isinstance(result, str | PathLike):
+                files.append(Path(result))
+            else:
+                raise UsageError(f"{type(result).__name__}: is no result; give a path, or what a function gave")
+        yield files
+
+
+def warn(texts: Iterable[str], frames: int = 3) -> None:
+    """Warn of each text, at the line of whoever called the function of `import brakecli`."""
+    for text in texts:
+        warnings.warn(text, stacklevel=frames)

@@ -1,0 +1,189 @@
+"""What a caller in Python gives, as the command line has it: cases, studies, settings, axes, points, signals."""
+
+import multiprocessing
+import os
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+from datetime import date, time
+from itertools import pairwise
+from os import PathLike
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from brakecli.errors import UnreadableResultError, UsageError
+
+if TYPE_CHECKING:
+    from brakecli.case.read import LoadedCase
+    from brakecli.front.measured import Measured
+    from brakecli.scattering.study import LoadedStudy
+    from brakecli.sweeps.listed import Listed
+    from brakecli.sweeps.plan import LoadedSweep
+    from brakecli.sweeps.tables import Axis
+
+    Source: TypeAlias = str | PathLike[str] | LoadedCase
+    Settings = Mapping[str, Any]
+
+
+def case_of(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
+    """The case of a path, of a loaded case or of a result, with changed settings."""
+    from brakecli.case.case import given_toml
+    from brakecli.case.read import LoadedCase, parse_case, parse_resolved
+    from brakecli.front.inputs import load_case
+
+    if isinstance(source, LoadedCase):
+        if settings:
+            changed = parse_case(given_toml(source.case), "the case", overrides(settings), source.records)
+            return replace(changed, text=source.text)
+        return source
+    if resolved := getattr(source, "attrs", {}).get("resolved_toml"):  # a result
+        return parse_resolved(str(resolved), "its case", overrides(settings))
+    if not isinstance(source, str | PathLike):
+        raise UsageError(f"{type(source).__name__}: is no case; give a path, or a case from brakecli.load")
+    return load_case(str(source), overrides(settings))
+
+
+def study_of(source: Any, settings: "Settings | None" = None) -> "LoadedStudy":
+    """The study of a path, or one that was loaded, which takes no settings."""
+    from brakecli.front.inputs import load_study
+    from brakecli.scattering.study import LoadedStudy
+
+    if not isinstance(source, LoadedStudy):
+        return load_study(str(source), overrides(settings))
+    if settings:
+        raise UsageError("settings: come too late for a study that was loaded; give them to brakecli.load")
+    return source
+
+
+def overrides(settings: "Settings | None") -> list[str]:
+    """Settings as `--set` has them; a table replaces the one that the case has."""
+    return [f"{key}={_toml(value, key)}" for key, value in mapping(settings, "settings").items()]
+
+
+def axis_of(vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings]") -> "Axis":
+    """The axis along which modes are followed; raises UsageError where values neither rise nor fall."""
+    import tomli_w
+
+    from brakecli.case.read import parse_table
+    from brakecli.sweeps.tables import Axis
+
+    if len(mapping(vary, "vary")) != 1:
+        raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
+    [(keys, values)] = vary.items()
+    along = values if isinstance(values, Mapping) else {"values": values}
+    axis = parse_table(Axis, tomli_w.dumps(plain({"parameter": keys, **along}, "vary")), "vary")
+    places = axis.values or (axis.start or 0.0, axis.stop or 0.0)
+    steps = [after - before for before, after in pairwise(places) if axis.numeric]
+    if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
+        raise UsageError("vary: modes are followed along numbers that rise or fall; sort them, each once")
+    return axis
+
+
+def axes_of(axes: Any, direction: Any) -> list[dict[str, Any]]:
+    """The tables `[[axis]]` of a sweep."""
+    given = mapping(axes, "axes")
+    ways = dict.fromkeys(given, direction) if isinstance(direction, str) and len(given) == 1 else direction
+    ways = mapping(ways, "direction")
+    if unknown := [key for key in ways if key not in given]:
+        raise UsageError(f"direction: {unknown[0]!r} is not among the axes; name an axis as axes does")
+    return [
+        {"parameter": key}
+        | dict(each if isinstance(each, Mapping) else {"values": each})
+        | ({"direction": ways[key]} if key in ways else {})
+        for key, each in given.items()
+    ]
+
+
+def ends_of(given: Any) -> tuple[float, float]:
+    """Both ends of a range; raises UsageError for anything else."""
+    try:
+        low, high = map(float, given)
+    except (TypeError, ValueError):
+        raise UsageError(f"parameter: {given!r} is not both ends of a range; give two numbers") from None
+    return low, high
+
+
+def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
+    """Points that are given by columns; a data frame has them as well."""
+    from brakecli.case.read import key_path
+    from brakecli.sweeps.listed import Listed
+
+    if points is None:
+        return None
+    if not hasattr(points, "keys"):
+        raise UsageError("points: are no columns; write them as {'friction.coefficient': [0.3, 0.5]}")
+    columns = plain({key: points[key] for key in points}, "points")
+    if wrong := [key for key in columns if not key_path(key)]:
+        raise UsageError(f"points: {wrong[0]!r} is no key path; name a key as in 'link2.angle_deg'")
+    if len({*map(key_path, columns)}) < len(columns):
+        raise UsageError("points: a key has two columns; keep one of them")
+    lists = [each for each in columns.values() if isinstance(each, list)]
+    if len(lists) < len(columns) or len({*map(len, lists)}) != 1 or not all(lists):
+        raise UsageError("points: need a value of each key at each point, and one point at least")
+    return Listed.of([*columns], columns.values())
+
+
+def measured_of(
+    function: str, quantity: str | None, belt_speed: Any, stiffness: Any, reading: dict[str, Any]
+) -> "Measured":
+    """How a signal was measured, from the arguments of a function."""
+    from brakecli.front.measured import NUMBERS, Measured
+
+    how = ("column", "time_column", "sample_rate", "unit", "time_unit")
+    if unknown := sorted(reading.keys() - {*how}):
+        raise UsageError(f"{function}: there is no argument {unknown[0]}; give one of {', '.join(how)}")
+    given = {"quantity": quantity, "belt_speed": belt_speed, "stiffness": stiffness, **reading}
+    texts = {name: str(each) for name, each in given.items() if each is not None and name not in NUMBERS}
+    return Measured(**given | texts)
+
+
+def scheduler_of(given: Any) -> Any:
+    """The scheduler that is given, or the address in the environment; None without one."""
+    return given if given is not None else os.environ.get("DASK_SCHEDULER_ADDRESS") or None
+
+
+def refuse_jobs(jobs: int | None) -> None:
+    """Raise UsageError for a wrong number of workers, and end a worker that is being started by a script."""
+    if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
+        raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
+    if getattr(multiprocessing.current_process(), "_inheriting", False):
+        os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
+
+
+def mapping(given: Any, name: str) -> Mapping[Any, Any]:
+    """A mapping, empty for None; raises UsageError for anything else."""
+    if not isinstance(given, Mapping | None):
+        raise UsageError(f"{name}: is no mapping; write it as {{'friction.coefficient': ...}}")
+    return given or {}
+
+
+def _toml(value: Any, key: str) -> str:
+    import tomli_w
+
+    value = plain(value, key)
+    if isinstance(value, Mapping):
+        return "{" + ", ".join(f"{name} = {_toml(each, f'{key}.{name}')}" for name, each in value.items()) + "}"
+    if isinstance(value, list):
+        return f"[{', '.join(_toml(each, key) for each in value)}]"
+    return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
+
+
+def plain(value: Any, key: str) -> Any:
+    """The value of a key without NumPy or xarray, as TOML holds it, or UsageError."""
+    if key.rpartition(".")[2] == "profile" and not isinstance(value, str | PathLike):
+        from brakecli.case.profile import given
+
+        try:
+            return given(value)
+        except UnreadableResultError as error:
+            raise UsageError(f"{key}: {error}") from error
+    if isinstance(value, Mapping) and hasattr(value, "attrs"):  # a dataset, or a tree of them
+        what = "is a result in memory; give output to the function that computes it, and name that file"
+        raise UsageError(f"{key}: {what}")
+    value = value.to_numpy() if hasattr(value, "to_numpy") else value
+    value = value.tolist() if hasattr(value, "tolist") else value
+    if isinstance(value, Mapping):
+        return {str(name): plain(each, f"{key}.{name}") for name, each in value.items()}
+    if isinstance(value, Iterable) and not isinstance(value, str):
+        return [plain(each, key) for each in value]
+    if not isinstance(value, str | int | float | date | time | PathLike):
+        raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
+    return str(value) if isinstance(value, PathLike) else value

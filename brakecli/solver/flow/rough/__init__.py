@@ -1,0 +1,193 @@
+"""The flow on rough pads, with its derivative: a Runge-Kutta method with a fixed number of steps.
+
+The number of steps does not depend on the state, so the end is a smooth function of the state, of the span and of
+the parameters, as long as the sequence of phases is the same.
+
+**Contact.** The pad is cut into cells of equal length, and the gap f2 - f1 - y is a straight line in each of
+them. The force (2), its derivatives by x and y and the length that touches are then closed forms, and the force is
+continuously differentiable. The heights at the nodes are those of the surfaces times tan(ωc/2) / (ωc/2) for a cell
+of length c. With this factor the force of a pad that touches everywhere is exact. In partial contact the cells in
+which contact begins or ends have an error of order c³, which cancels on average as the edge passes through a
+cell. The end of a flow has an error of order c⁴. A wave is even or odd about the middle of the pad, so tables of
+one half are enough.
+
+**Events.** A phase ends where a margin becomes zero: in slip the sliding speed, in stick how far the friction that
+is needed lies within the friction cone. The event is located inside the step and divides it into two parts.
+Lift-off is no event, because the normal force is continuous. A margin that dips below zero and returns within one
+step is found by the cubic through its values and slopes.
+
+**Derivative.** Columns hold the derivatives of x, y, v_x and v_y by each component of the first state. They obey
+the variational equations, and their steps are the derivatives of the steps of the state. At an event the length p
+of a part of a step depends on the state: margin(z(p)) = 0 gives dp = -dm / (∂m/∂p). The disturbed motion then has
+dz + (∂z/∂p) dp, and reaches the event later by dp. The next part begins later by dp and is shorter by dp. For
+short steps this is the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth
+Mechanical Systems, Springer 2004, ch. 7). Here it is the exact derivative of the computed flow, whatever the step
+is.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brakecli import stop
+from brakecli.solver.compile import LARGEST, Floats
+from brakecli.solver.contact.pad import aligned
+from brakecli.solver.double_double import two_product
+from brakecli.solver.flow.rough.events import fly, hold
+from brakecli.solver.flow.rough.record import EIGHT, FOUR, ROUGH
+from brakecli.solver.flow.rough.record import Status as Status
+from brakecli.solver.records import Parts, new
+from brakecli.solver.roughness import Surface, wheel_angles
+from brakecli.solver.system import System
+
+CELLS_PER_WAVE, LEAST_CELLS = 24, 96
+STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passes
+
+
+@dataclass(frozen=True)
+class Margins:
+    """How near a flow comes to another sequence of phases, and how its pad touches; infinite where nothing counts.
+
+    `slide`: least sliding speed (m/s) inside phases of slip and at both ends of the span. `hold`: least distance
+    (N) of the force that stick takes from the friction cone, as stick begins, inside it, and at both ends of the
+    span. `pass_by`: least force (N) by which stick failed where slip reversed. Zeros at events do not count.
+    `contact` and `most_contact`: least and largest part of the pad that touches, at the ends of steps.
+    `open_share` and `stick_share`: parts of the span in which nothing touches, to half a step, and in which the
+    shoe sticks.
+    """
+
+    slide: float
+    hold: float
+    pass_by: float
+    contact: float
+    most_contact: float
+    open_share: float
+    stick_share: float
+
+
+@dataclass(frozen=True)
+class Flown:
+    """What a flow has come to: state and velocity (its derivative by time) are those of x, y, v_x and v_y.
+
+    `derivative`: of the state by the first state; None where it was not asked for, or where the flow has failed.
+    `word`: the phases, `BACKWARD`, `STICK` or `FORWARD`; `times` (s) of the events between them, from the begin.
+    `x` and `y`: least and largest (m).
+    """
+
+    status: Status
+    state: Floats
+    derivative: Floats | None
+    velocity: Floats
+    word: tuple[int, ...]
+    times: tuple[float, ...]
+    x: tuple[float, float]
+    y: tuple[float, float]
+    margins: Margins
+
+
+def default_cells(system: System) -> int:
+    """Cells of the pad for the shortest wave of both surfaces."""
+    return max(LEAST_CELLS, math.ceil(CELLS_PER_WAVE * 2.0 * system.half_length * system.most_turns))
+
+
+def default_steps(system: System, span: float, per_period: float = STEPS_PER_PERIOD) -> int:
+    """Steps of a span (s), so many to the fastest period, of the shoe in full contact or of a wave that passes."""
+    fastest = max(system.natural_frequencies[1], system.passing_frequency)
+    return max(1, math.ceil(per_period * fastest * span))
+
+
+class RoughFlow:
+    """The flow of a system on rough pads, at constant speed and load; one call after the other."""
+
+    def __init__(self, system: System, cells: int = 0) -> None:
+        """Make the tables of so many cells, an even number; 0 takes `default_cells`.
+
+        Raises ValueError where speed or load change, or where a cell is longer than half a wave.
+        """
+        if not system.steady:
+            raise ValueError("the flow needs a constant speed and a constant load")
+        cells = cells or default_cells(system)
+        cells += cells % 2
+        cell = 2.0 * system.half_length / cells
+        if not cell * system.most_turns < 0.5:
+            raise ValueError(f"{cells} cells are too few: two and more to each wave are needed")
+        self.system, self.cells = system, cells
+        self._flow, self._tables = _prepared(system, cells)
+        n, at = system.wheel.g.size, int(self._flow["angles_at"])
+        self._belt, self._waves, self._angles = system.belt_speed, system.wheel.waves, self._tables[at : at + n]
+        self._memory = np.zeros(LARGEST, np.int8)
+        self._address = self._memory.ctypes.data
+        hold(Parts(system.coefficients, self._flow, self._tables), self._address)
+
+    def __call__(self, state: Floats, begin_time: float, span: float, steps: int, tangents: bool = True) -> Flown:
+        """The flow from a state (x, y, v_x, v_y) at a time (s), over a span (s) in so many equal steps."""
+        f = self._flow
+        travel, travel_low = two_product(self._belt, begin_time)
+        wheel_angles(self._waves, travel, travel_low, self._angles)
+        f["z"], f["tangents"] = state, int(tangents)
+        status = Status(fly(self._address, span / steps, steps))
+        events = int(f["events"])
+        return Flown(
+            status,
+            f["end"].copy(),
+            f["t_end"].copy() if tangents and status is Status.DONE else None,
+            f["rates"].copy(),
+            tuple(f["word"][: events + 1].tolist()),
+            tuple(f["times"][:events].tolist()),
+            (float(f["least_x"]), float(f["most_x"])),
+            (float(f["least_y"]), float(f["most_y"])),
+            Margins(
+                *(float(f[name]) for name in ("least_slide", "least_hold", "least_pass")),
+                *(float(f[name]) for name in ("least_contact", "most_contact")),
+                *(float(f[name]) / span for name in ("open", "stuck")),
+            ),
+        )
+
+
+def _flattened(surface: Surface, cell: float) -> Floats:
+    """Amplitudes of a gap that is straight in each cell: its force in full contact is that of the sines."""
+    half = 0.5 * surface.omega * cell
+    found: Floats = surface.g * np.tan(half) / half
+    return found
+
+
+def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
+    """The record of a flow, and its tables."""
+    f, wheel, shoe, a = new(ROUGH), system.wheel, system.shoe, system.half_length
+    half, waves, cell = cells // 2, wheel.g.size, 2.0 * a / cells
+    width, eights = -(-(half + 1) // FOUR) * FOUR, -(-waves // EIGHT) * EIGHT
+    shapes = {
+        "waves_at": (waves, 2, width),  # first, for its rows must be aligned
+        "nodes_at": (4, width),
+        "shoe_at": (2, width),
+        "sines_at": (4, eights),
+        "omega_at": (waves,),
+        "g_at": (waves,),
+        "full_at": (waves,),
+        "angles_at": (waves,),
+    }
+    tables, table, place = aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
+    for name, shape in shapes.items():
+        f[name], size = place, math.prod(shape)
+        table[name] = tables[place : place + size].reshape(shape)
+        place += size
+    xi, g, heights = cell * np.arange(width), _flattened(wheel, cell), table["shoe_at"]
+    for amplitude, omega, phase in zip(_flattened(shoe, cell), shoe.omega, shoe.phase, strict=True):
+        heights += amplitude * np.sin(omega * np.array([xi, -xi]) + phase)
+    table["omega_at"][:], table["g_at"][:] = wheel.omega, g
+    angle = np.outer(wheel.omega, xi)
+    table["waves_at"][:, 0], table["waves_at"][:, 1] = np.sin(angle), np.cos(angle)
+    steeper = np.divide(wheel.g, g, out=np.ones_like(g), where=g != 0.0)
+    table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * steeper
+    f["belt"], f["stiffness"] = system.belt_speed, system.contact_stiffness
+    load, c = system.load_at_start, system.coefficients
+    f["pull_x"], f["pull_y"] = load * c.sin_beta, load * c.cos_beta
+    f["half"], f["cells"], f["half_cells"] = 0.5 * system.layer_stiffness * cell, cells, half
+    f["width"], f["waves"] = width, waves
+    f["shoe_mean"] = float(np.sum(shoe.g * np.sin(shoe.phase) * np.sinc(shoe.omega * a / np.pi)))
+    crest, nodes = float(np.abs(g).sum()), heights[:, : half + 1]
+    f["full_up_to"], f["clear_from"] = -crest - nodes.max(), crest - nodes.min()
+    f["signals"] = np.frombuffer(stop.memory, np.uint8).ctypes.data
+    return f, tables
