@@ -18,6 +18,7 @@ from brakecli.solver.flow.seek import FOUND, LINEAR, Pursuit
 from brakecli.solver.flow.smooth import DONE
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
+from brakecli.stop import signalled
 
 MOST_STEPS = 5_000_000
 """Steps of a motion on smooth pads after which it is given up: about half a second."""
@@ -95,7 +96,7 @@ def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
     except np.linalg.LinAlgError:  # modes that are alike
         return UNKNOWN
     rate = float(values.real.max())
-    while motion.path.steps < MOST_STEPS and motion.way.time < longest:
+    while motion.path.steps < MOST_STEPS and motion.way.time < longest and not signalled():
         if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
             motion.way.duration = motion.way.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()
@@ -134,7 +135,7 @@ class _Span:
         states, matrix, length = [state], np.eye(4), self.length / self.parts
         for part in range(self.parts):
             run = self.flow(states[-1], part * length, length, self.steps, tangents)
-            if run.status is not Status.DONE:
+            if run.status is not Status.DONE or signalled():
                 return None
             states.append(run.state)
             matrix = matrix if run.derivative is None else run.derivative @ matrix

@@ -236,7 +236,7 @@ class Explorer:
             if first is not None:
                 branch = both_ways(problem, first, self._settings(), self._until(problem, first), self.stop)
                 self.branches.append(self._followed(branch, problem, kind=FORCED))
-        if len(self.branches) == 1:
+        if len(self.branches) == 1 and not self.stop():
             self.notes.append("no motion was found that the waves force")
 
     def _forced_from(self, problem: Forced, p: float, state: Any) -> None:
