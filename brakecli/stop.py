@@ -25,14 +25,19 @@ def show_signals() -> None:
     signal.set_wakeup_fd(_file, warn_on_full_buffer=False)
 
 
+def signalled() -> bool:
+    """Whether kernels give up, as a signal has come; what flies by many short ones asks here."""
+    return memory[0] in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
+
+
 def check_signals() -> None:
     """Raise KeyboardInterrupt after Ctrl-C, and SystemExit after another signal that kernels have given up on.
 
     Python's handler has raised one already. It is lost where it comes out of a finalizer, or out of the C code in
     front of a compiled function, and what kernels have given up is worth nothing.
     """
-    if (number := memory[0]) in (signal.SIGHUP, signal.SIGINT, signal.SIGTERM):
-        raise KeyboardInterrupt if number == signal.SIGINT else SystemExit(128 + number)
+    if signalled():
+        raise KeyboardInterrupt if memory[0] == signal.SIGINT else SystemExit(128 + memory[0])
 
 
 def hide_signals(file: int = -1) -> None:

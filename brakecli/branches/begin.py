@@ -14,6 +14,7 @@ from brakecli.branches.problem import Array
 from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.seek import FOUND, LINEAR, Pursuit
 from brakecli.solver.flow.smooth import DONE
+from brakecli.stop import signalled
 
 MOST_STEPS = 5_000_000
 """Steps of a motion on smooth pads after which it is given up: about half a second."""
@@ -72,7 +73,7 @@ def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
     except np.linalg.LinAlgError:  # modes that are alike
         return UNKNOWN
     rate = float(values.real.max())
-    while motion.path.steps < MOST_STEPS and motion.way.time < longest:
+    while motion.path.steps < MOST_STEPS and motion.way.time < longest and not signalled():
         if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
             motion.way.duration = motion.way.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()

@@ -182,7 +182,7 @@ class Explorer:
             first = problem.begun(p, replace(self._settings(), points=300))
             if first is not None:
                 self._follow(problem, first, FORCED, within=True)
-        if len(self.branches) == 1:
+        if len(self.branches) == 1 and not self.stop():
             self.notes.append("no motion was found that the waves force")
 
     def _forced_from(self, problem: Forced, p: float, state: Any) -> None:

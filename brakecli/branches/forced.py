@@ -29,6 +29,7 @@ from brakecli.solver.flow.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Statu
 from brakecli.solver.period import common_period
 from brakecli.solver.roughness import surface
 from brakecli.solver.system import System
+from brakecli.stop import signalled
 
 DIFFERENCE = 1e-6
 """Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so they are
@@ -119,6 +120,8 @@ class Forced(Doubled):
         for k, state in enumerate(states):
             if abs(state[2] - belt) <= SNAP * frame.scales[2]:
                 state[2] = belt
+            if signalled():
+                return REASONS[Status.STOPPED]
             run = flow(state, k % frame.segments * length, length, frame.steps, derivative)
             if run.status is not Status.DONE:
                 return REASONS[run.status]
@@ -230,7 +233,7 @@ class Forced(Doubled):
         first = start(problem, u, FIRST_WAVES)
         if first is None:
             return None
-        branch = follow(problem, first, 1.0, settings or GROWING)
+        branch = follow(problem, first, 1.0, settings or GROWING, stop=signalled)
         last = branch.points[-1]
         return start(self, last.u, p) if last.p == 1.0 else None
 
@@ -247,7 +250,7 @@ class Forced(Doubled):
         visited = [(np.asarray(state, float) - origin) / frame.scales]
         for n in range((waited + most) * frame.segments):
             end = one._segment(visited[-1], p, n % frame.segments)
-            if end is None:
+            if end is None or signalled():
                 return None
             visited.append(end)
         begin = waited * frame.segments

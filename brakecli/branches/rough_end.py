@@ -11,6 +11,7 @@ from brakecli.branches.problem import Array
 from brakecli.solver.flow.rough import RoughFlow, Status, default_steps
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
+from brakecli.stop import signalled
 
 SPAN = 10.0
 """Periods of the slowest mode, at least, in a span of whole common periods, at whose ends motions on rough pads
@@ -62,7 +63,7 @@ class _Span:
         states, matrix, length = [state], np.eye(4), self.length / self.parts
         for part in range(self.parts):
             run = self.flow(states[-1], part * length, length, self.steps, tangents)
-            if run.status is not Status.DONE:
+            if run.status is not Status.DONE or signalled():
                 return None
             states.append(run.state)
             matrix = matrix if run.derivative is None else run.derivative @ matrix

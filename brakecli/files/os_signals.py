@@ -38,7 +38,7 @@ def handle_signals() -> None:
                 with suppress(Exception):  # a failing disk, or a bar that is just being drawn
                     left = _last.pop()() or left
             said = "; ".join(filter(None, (_WORDS[number], escaped(left))))
-            os.write(2, f"brakecli: {said}\n".encode(errors="backslashreplace"))
+            os.write(2, f"brakecli: {said}\n".encode())
         finally:
             os._exit(128 + number)
 

@@ -17,8 +17,8 @@ from brakecli.plots.branch import _line, _with_ends
 from brakecli.plots.result import draw
 from brakecli.plots.style import DARK, applied
 from tests.analysis.shoes import Shoe
+from tests.commands import ROOT, environment
 from tests.commands import brakecli as command
-from tests.commands import environment
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -252,6 +252,37 @@ def test_an_interruption_leaves_a_whole_file_that_ends_in_budget(here: Path) -> 
     tree = brakecli.load(here / "cut.h5")
     assert tree["branch_1/special/kind"].values.tolist()[-1] == "budget"
     assert 10 < tree["branch_1"].sizes["point"] < 31
+
+
+BEGINNING = """
+import os, signal, threading
+from brakecli.branches import forced
+
+grown = forced.Forced.grown
+
+def interrupted(*arguments):
+    os.kill(os.getpid(), signal.SIGTERM)
+    timer = threading.Timer(2.0, os._exit, [9])
+    timer.daemon = True
+    timer.start()
+    return grown(*arguments)
+
+forced.Forced.grown = interrupted
+from brakecli.__main__ import main
+main()
+"""
+
+
+def test_an_interruption_ends_the_search_for_a_first_motion(tmp_path: Path) -> None:
+    """As the waves of a rough wheel grow to find it, which takes half a minute here."""
+    case = str(ROOT / "cases" / "rough-partly-open.toml")
+    words = [sys.executable, "-c", BEGINNING, "branch", case, *FRICTION, "-o", "cut.h5", "-q"]
+    done = subprocess.run(words, cwd=tmp_path, env=environment(), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (
+        143,
+        "brakecli: terminated; what was followed up to here is in cut.h5\n",
+    )
+    assert "branch_0" in brakecli.load(tmp_path / "cut.h5")
 
 
 def test_a_shoe_that_locks_is_said_to_lock(here: Path) -> None:

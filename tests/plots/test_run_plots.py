@@ -1,9 +1,8 @@
 """Pictures of runs: what they show is what the result holds, and every fault ends in its exit code."""
 
-import signal
 import sys
 import xml.etree.ElementTree as ET
-from collections.abc import Iterator
+from collections.abc import Callable
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -82,9 +81,8 @@ def gathered(path: Path, moved: Samples, *overrides: str, **attributes: Any) -> 
 
 
 @pytest.fixture
-def run_command(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+def run_command(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     """Run the command line here; what it is given back is the exit code."""
-    handler = signal.getsignal(signal.SIGTERM)
 
     def run(*arguments: str | Path) -> int:
         monkeypatch.setattr(sys, "argv", ["brakecli", *map(str, arguments)])
@@ -92,8 +90,7 @@ def run_command(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
             cli.main()
         return int(caught.value.code or 0)
 
-    yield run
-    signal.signal(signal.SIGTERM, handler)
+    return run
 
 
 def test_each_suffix_gives_a_whole_picture_of_its_kind_and_the_same_bytes_again(tmp_path: Path) -> None:
