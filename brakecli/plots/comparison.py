@@ -50,8 +50,9 @@ def draw(result: StoredResult) -> Figure:
         work = np.where(drawn & (columns[name] > 0.0), factor * columns[name], np.nan)
         _draw_errors(axes, columns, work)
         if target > 0.0:
-            words = f"target {target:g}"
-            axes.axhline(target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=words)
+            axes.axhline(
+                target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=f"target {target:g}"
+            )
         if best is not None and math.isfinite(columns[name][best]):
             ring: dict[str, Any] = {"ms": 16.0, "mfc": "none", "mec": style.GREEN, "mew": 2.2, "zorder": 4.0}
             axes.plot(factor * columns[name][best], errors[best], "o", label="recommended", **ring)

@@ -90,8 +90,7 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
     if kind == "sweep":
         picture = gather.gather(result, select, variable)
         return curves.draw(picture) if len(picture.axes) == 1 and not picture.listed else maps.draw(picture)
-    others = {"comparison": comparison.draw, "stability": lock_in.draw}
-    others |= {"scatter": scatter.draw}
+    others = {"comparison": comparison.draw, "stability": lock_in.draw, "scatter": scatter.draw}
     if kind not in ("run", "branch", *others):
         known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
@@ -106,7 +105,6 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
     if kind == "branch":
         return branch.draw(result, variable)
     if variable:
-        known = "runs, sweeps and branches"
-        what = f"{argument('variable')} is for {known} (found {variable!r})"
+        what = f"{argument('variable')} is for runs, sweeps and branches (found {variable!r})"
         raise UsageError(f"{result.path}: {what}; leave it out")
     return others[kind](result)

@@ -57,21 +57,15 @@ class Findings:
             names, counts = np.unique(records["regime"], return_counts=True)
             regimes.update(dict(zip(names.tolist(), counts.tolist(), strict=True)))
         self.regimes = {name.decode(): count for name, count in sorted(regimes.items())}
-        self.hysteresis: NDArray[Any] | None = None
+        self.hysteresis, said = _hysteresis(journal)
+        self.sentences = [*said, *on_short_runs(journal), *_on_undecided(journal), *_on_settled(journal)]
         self.critical: tuple[int, float, float] | None = None  # how many points have one, the least, the largest
-        self.sentences: list[str] = []
-        if plan.passes == 2:
-            self.hysteresis, self.sentences = _hysteresis(journal)
-        self.sentences += on_short_runs(journal)
-        self.sentences += _on_undecided(journal)
-        self.sentences += _on_settled(journal)
-        if plan.sweep.critical is not None:
+        if (sought := plan.sweep.critical) is not None:
             values = journal.column("critical")
             known = values[~np.isnan(values)]
             self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
-            self.sentences += _on_lasting_vibration(journal, plan.sweep.critical.tolerance)
-            self.sentences += _on_wide_bars(journal, plan.sweep.critical.lower, plan.sweep.critical.upper)
-            self.sentences += _on_no_dashpots(plan)
+            bars = _on_wide_bars(journal, sought.lower, sought.upper)
+            self.sentences += [*_on_lasting_vibration(journal, sought.tolerance), *bars, *_on_no_dashpots(plan)]
         self.attractors: list[Attractor] | None = None
         if plan.over_starts:
             come_to = Attractors.of(journal)
@@ -181,8 +175,10 @@ def _values(axis: Axis) -> list[Any]:
     return [axis.value(place) for place in range(axis.size)]
 
 
-def _hysteresis(journal: Journal) -> tuple[NDArray[Any], list[str]]:
-    """Where the motions on the way up and on the way down differ (1), and what is to be said about that."""
+def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
+    """Where the motions on the way up and on the way down differ (1), and what to say of it; None without both."""
+    if journal.plan.passes != 2:
+        return None, []
     regime, amplitude = journal.column("regime"), journal.column("amplitude")
     done = (journal.column("status") == _DONE) & (regime != b"undecided")
     lasting, other = (regime != b"damped").any(axis=0), regime[0] != regime[1]
