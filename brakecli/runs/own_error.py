@@ -62,12 +62,12 @@ class Known(NamedTuple):
         return min(duration, self.unsure, duration * (int(over[0]) if len(over) else spans) / spans)
 
 
-def certify_by_own_error(system: System, run: Callable[[System], Motion]) -> Certified:
-    """The motion to the tolerance of its method, by event-driven runs.
+def by_own_error(system: System) -> Generator[System, Motion, Certified]:
+    """Event-driven runs to the tolerance of a method, see `promised`.
 
     On nodes, where the method leaves that open, unless so many were needed that the exact contact is cheaper.
     """
-    return last_of(promised(system, first_of(system), partial(_finer, system)), run)
+    return promised(system, first_of(system), partial(_finer, system))
 
 
 def last_of(runs: Generator[System, Motion, Certified], run: Callable[[System], Motion]) -> Certified:

@@ -20,7 +20,7 @@ from brakecli.runs.certificate import (
 )
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import ladder
-from brakecli.runs.own_error import certify_by_own_error, last_of
+from brakecli.runs.own_error import by_own_error, last_of
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.system import System
 
@@ -40,9 +40,8 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     """
     if system.method.row.exact:
         return _by_phases(system, progress)
-    if system.method.own_steps:
-        return certify_by_own_error(system, lambda rung: _solved(rung, progress))
-    return last_of(ladder(system), lambda rung: _solved(rung, progress))
+    runs = by_own_error(system) if system.method.own_steps else ladder(system)
+    return last_of(runs, lambda rung: _solved(rung, progress))
 
 
 def begins_with_steps(system: System) -> bool:
