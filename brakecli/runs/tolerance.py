@@ -5,7 +5,6 @@ and the finest one is the answer: what two of them differ by is the error of the
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -51,11 +50,6 @@ def begins_with_steps(system: System) -> bool:
     return chosen and method.tolerance >= NODES_FROM and system.steady
 
 
-def _run(system: System, progress: Progress, **changes: Any) -> Motion:
-    """The motion by the system's method with these changes."""
-    return _solved(replace(system, method=replace(system.method, **changes)) if changes else system, progress)
-
-
 def _solved(system: System, progress: Progress) -> Motion:
     per_sample, block = system.per_sample, 1
     if system.nodes or not system.method.own_steps:
@@ -69,7 +63,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     Where that may be too much, a replica with other steps shows what the motion makes of it. Where samples are
     close, a step of this run passes over several of them.
     """
-    wanted, run, longest = system.method.tolerance, _run(system, progress), SHORTER * system.longest_step
+    wanted, run, longest = system.method.tolerance, _solved(system, progress), SHORTER * system.longest_step
     largest, carried = run.work.rounding or (np.zeros(4), np.zeros(4))
     error = max(ROUNDED_MARGIN * float((carried / sizes(system, largest, largest)).max()), ROUNDING)
     if error <= wanted and not run.work.failed:
@@ -78,7 +72,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     every = max(n for n in range(1, 1 + max(1, int(longest / system.interval))) if system.samples % n == 0)
     share = min(1.0, run.system.step / system.longest_step) if every == 1 else 1.0
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
-    other = _run(replica(sparse), lambda samples: None, share=SHORTER * share)
+    other = _solved(replica(sparse).by(share=SHORTER * share), lambda samples: None)
     run.work.solve_seconds += other.work.solve_seconds
     apart = compare(run, other)
     error, failed = ROUNDING_MARGIN * apart.error, run.work.failed or other.work.failed

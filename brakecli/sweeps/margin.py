@@ -5,7 +5,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction, mean_stiffness
+from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.limits import within_range
@@ -43,7 +43,7 @@ def _critical(plan: Plan, settings: dict[tuple[str, ...], object]) -> float:
         return np.nan
     try:
         with within_range():
-            found = critical_friction(system, mean_stiffness(system, system.contact_stiffness))
+            found = critical_friction(system, system.contact_stiffness)
     except RefusedError:
         return np.nan
     return LARGEST_FRICTION if found is None else found

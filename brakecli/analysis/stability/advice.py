@@ -14,7 +14,7 @@ from pydantic import ValidationError
 
 from brakecli.analysis.stability.edges import edges
 from brakecli.analysis.stability.modes import growth
-from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction, mean_stiffness
+from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction
 from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case
 from brakecli.case.read import put
@@ -107,7 +107,7 @@ def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
             rest = steady_sliding(system, mean=tabulated(system))
             k = rest.stiffness if rest.is_pressed(system.load_at_start) else 0.0
         if belt != 0.0 and k > 0.0:
-            critical = critical_friction(system, mean_stiffness(system, k), up_to)
+            critical = critical_friction(system, k, up_to)
             return Answer(critical, growth(c, k, math.copysign(c.phi, belt)) if rest else None)
     return None
 

@@ -110,13 +110,14 @@ def changes(system: System, stiffness_at: StiffnessAt, up_to: float = LARGEST_FR
     return _rough_crossings(c, belt, stiffness_at, up_to)
 
 
-def critical_friction(system: System, stiffness_at: StiffnessAt, up_to: float = LARGEST_FRICTION) -> float | None:
+def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_FRICTION) -> float | None:
     """Largest friction coefficient up to which sliding is stable, 0 where it never is, or None where it always is.
 
-    Where stability changes nowhere, the growth at the system's own friction decides. The wheel turns.
+    `stiffness` (N/m): that of steady sliding, or of full contact where there is none. Where stability changes
+    nowhere, the growth at the system's own friction decides. The wheel turns.
     """
-    c, found = system.coefficients, changes(system, stiffness_at, up_to)
-    if found:
+    c, stiffness_at = system.coefficients, mean_stiffness(system, stiffness)
+    if found := changes(system, stiffness_at, up_to):
         return found[0].friction if found[0].lost else 0.0
     k = stiffness_at(c.phi)
     if not k > 0.0:
