@@ -1,5 +1,6 @@
 """Cases that several tests share, and running them in memory."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -68,6 +69,14 @@ MODE_COUPLING: dict[str, Any] = {  # minimal model of mode coupling: cxx = 2, cy
     "contact": {"half_length": 1.0, "stiffness": 2.0 / 3.0},
     "initial": {"at": "equilibrium", "x": 1e-3},
     "solver": {"step": 0.005, "duration": 20.0},
+}
+
+NEVER_STABLE = {  # changes of SQUEAL: its one mode without damping grows by any friction
+    "link1__angle_deg": 20.0,
+    "link2__damping": 0.0,
+    "link2__stiffness": 2e6 * math.sin(math.radians(40.0)) / math.sin(math.radians(30.0)),
+    "friction__coefficient": 0.3,
+    "solver__duration": 0.05,
 }
 
 

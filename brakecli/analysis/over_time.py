@@ -1,6 +1,7 @@
 """A motion under changing speed or load, window by window: short-time spectra, and when it vibrates."""
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby, pairwise
 
@@ -110,16 +111,26 @@ def _statistics(history: History, hop: int, count: int) -> list[Array]:
     """
     inner = [round((place + 0.5 * (_HOPS + 1)) * hop) for place in range(count - 1)]
     parts = [*pairwise([0, *inner, history.samples])]
-    names = ("x", "vx", "friction_force")
-    means = {name: np.array([history.read(name, *part).mean() for part in parts]) for name in names}
+    means = {
+        name: np.array([each.mean() for each in _read(history, name, parts)])
+        for name in ("x", "vx", "friction_force")
+    }
 
     def swing(name: str) -> Array:
         """Half of peak to peak about the trend that the means of the neighbours show."""
         middles = np.array([0.5 * sum(part) for part in parts])
         trend = np.gradient(means[name], middles) if count > 1 else np.zeros(1)
-        blocks = (history.read(name, *part) for part in parts)
-        spans = [np.ptp(block - k * np.arange(len(block))) for block, k in zip(blocks, trend, strict=True)]
+        blocks = zip(_read(history, name, parts), trend, strict=True)
+        spans = [np.ptp(block - k * np.arange(len(block))) for block, k in blocks]
         return 0.5 * np.array(spans)
 
-    stick = [np.mean(history.read("state", *part) == ContactState.STICK) for part in parts]
+    stick = [np.mean(each == ContactState.STICK) for each in _read(history, "state", parts)]
     return [swing("x"), swing("vx"), np.array(stick), means["friction_force"]]
+
+
+def _read(history: History, name: str, parts: list[tuple[int, int]]) -> Iterator[Array]:
+    """A variable in each of the parts, which lie side by side; several are read at once."""
+    for first in range(0, len(parts), _AT_ONCE):
+        few = parts[first : first + _AT_ONCE]
+        start = few[0][0]
+        yield from np.split(history.read(name, start, few[-1][1]), [stop - start for _, stop in few[:-1]])

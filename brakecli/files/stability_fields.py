@@ -152,7 +152,10 @@ SCATTERED = (
     Field("frequency", "Hz", "of the vibration, or of the mode that counts"),
     Field("amplitude", "m", "half of peak to peak of x"),
     Field("growth_rate", "1/s", "of the mode that counts: one that squeals, or the one that grows fastest"),
-    ratio("critical_friction", "least friction coefficient at which stability ends; missing where none does"),
+    ratio(
+        "critical_friction",
+        "least friction coefficient at which stability ends; 0 where there is none, missing where it never ends",
+    ),
     Field("reason", "", "why the regime is as it is, or why there is no answer", SENTENCE),
 )
 OUTCOME = Field("outcome", "", "what a sample comes to", TEXT)

@@ -19,8 +19,8 @@ from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import values_of
-from brakecli.runs.cost import duration_text, stability_seconds, steps_and_seconds, table_seconds
-from brakecli.runs.run import asked, judged_in_memory
+from brakecli.runs.cost import duration_text, guessed, stability_seconds, table_seconds
+from brakecli.runs.judge import asked, judged_in_memory
 from brakecli.runs.settled import Judged, settled
 from brakecli.solver.motion import Counted, Motion
 from brakecli.solver.system import System
@@ -220,7 +220,7 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
     if there is None:
         return None
     system, found = system_of(there), of_case.answer(there, 0.0)
-    _, seconds = steps_and_seconds(system)
+    seconds = guessed(system).seconds
     decays = -found.growth if found and found.growth and system.steady else 0.0
     long = min(_DECAYED / (decays * system.duration), _DECAYED_SAMPLES / system.samples) if decays > 0.0 else 1.0
     part = min(max(long, 1.0), CHECK_SECONDS / max(seconds, 1e-9), _CHECK_SAMPLES / system.samples)

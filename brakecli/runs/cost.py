@@ -2,6 +2,7 @@
 
 import math
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -30,18 +31,26 @@ _SAMPLE_SECONDS = 8e-7
 _HELD, _HELD_EXACT = 4.0, 2.0  # histories: two with what compares them, or one while it is joined
 
 
-def steps_and_seconds(system: System) -> tuple[int, float]:
-    """Steps of a run, and a rough guess at the time of all runs that it takes to keep the tolerance."""
+class Price(NamedTuple):
+    """What a case costs: steps of a run, seconds of all of its runs, and whether it may well be much more."""
+
+    steps: int
+    seconds: float
+    at_least: bool = False
+
+
+def guessed(system: System) -> Price:
+    """A rough guess at what a case costs, without its file and its verdict."""
     method, pairs = system.method, 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
         each = _STEP_SECONDS * (1.0 + pairs / 20.0)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
         window = _window_seconds(system, system.sampled_duration * system.fastest_belt)
-        return system.steps, system.steps * each + window
+        return Price(system.steps, system.steps * each + window)
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
-        return system.steps, system.steps * _EXACT_STEP_SECONDS
+        return Price(system.steps, system.steps * _EXACT_STEP_SECONDS)
     tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), 1e-13)
     fastest, start = system.natural_frequencies[1], system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
@@ -57,7 +66,7 @@ def steps_and_seconds(system: System) -> tuple[int, float]:
         least_load = float(np.abs(system.load["value"]).min())
         open_part = 0.01 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
         each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
-    return steps, (1.0 if alone else 1.6) * steps * each
+    return Price(steps, (1.0 if alone else 1.6) * steps * each)
 
 
 def beside_seconds(system: System) -> float:

@@ -70,9 +70,8 @@ def ladder(system: System) -> Generator[System, Motion, Certified]:
     nodes, steps, quadrature = first_nodes(system), _Axis(), _Nodes()
     before, finer, seconds, rounding = None, steps, 0.0, Rounding(0.0, system.sampled_duration, wanted)
     while True:
-        method = replace(system.method, nodes=nodes << quadrature.doublings, step=first * 0.5**steps.doublings)
-        interval = max(1, every >> steps.doublings) * system.interval
-        rung = replace(system, interval=interval, method=method)
+        rung = system.by(nodes=nodes << quadrature.doublings, step=first * 0.5**steps.doublings)
+        rung = replace(rung, interval=max(1, every >> steps.doublings) * system.interval)
         beside = (yield replica(rung)) if before is None else None
         run = yield rung
         spent, failed = run.work.solve_seconds, run.work.failed

@@ -20,8 +20,8 @@ from brakecli.analysis.stability.discrete import (
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
-from brakecli.runs.cost import beside_seconds, duration_text, held_bytes, stability_seconds, steps_and_seconds
-from brakecli.runs.pilot import Price, measured
+from brakecli.runs.cost import beside_seconds, duration_text, guessed, held_bytes, stability_seconds
+from brakecli.runs.price import measured
 from brakecli.runs.settled import longest
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
@@ -57,17 +57,13 @@ class Check:
     warnings: tuple[str, ...] = ()
 
 
-def check(system: System, *, begin: bool = False, written: bool = True) -> Check:
-    """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs.
-
-    Unless `written`, the seconds are those of the loop alone.
-    """
+def check(system: System, *, begin: bool = False) -> Check:
+    """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs."""
     own, fastest = system.method.own_steps, system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
-    price = Price(*steps_and_seconds(system), at_least=False)
+    price = guessed(system)
     if (begin or price.seconds > MOST_SECONDS) and system.steps <= MOST_STEPS:
-        begun = measured(system) or price._replace(at_least=system.finds_patches)
-        price = begun if begun.seconds > 0.0 else price  # beyond the resolution of the clock
+        price = measured(system) or price._replace(at_least=system.finds_patches)
     found = Check(
         system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
@@ -76,7 +72,7 @@ def check(system: System, *, begin: bool = False, written: bool = True) -> Check
         steps_per_period=math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step),
         limits=step_limits(system),
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
-        seconds=price.seconds + (beside_seconds(system) if written else 0.0),
+        seconds=price.seconds + beside_seconds(system),
         at_least=price.at_least or system.settles,
         memory=2.0e8 + system.table_bytes + held_bytes(system),
         file_size=float(system.samples) * ROW_BYTES + 1e5,

@@ -62,12 +62,12 @@ class Known(NamedTuple):
         return min(duration, self.unsure, duration * (int(over[0]) if len(over) else spans) / spans)
 
 
-def certify_by_own_error(system: System, run: Callable[[System], Motion]) -> Certified:
-    """The motion to the tolerance of its method, by event-driven runs.
+def by_own_error(system: System) -> Generator[System, Motion, Certified]:
+    """Event-driven runs to the tolerance of a method, see `promised`.
 
     On nodes, where the method leaves that open, unless so many were needed that the exact contact is cheaper.
     """
-    return last_of(promised(system, first_of(system), partial(_finer, system)), run)
+    return promised(system, first_of(system), partial(_finer, system))
 
 
 def last_of(runs: Generator[System, Motion, Certified], run: Callable[[System], Motion]) -> Certified:
@@ -141,9 +141,8 @@ def first_of(system: System) -> System:
 
 def _run(system: System, tolerance: float, nodes: int) -> System:
     """A run to a tolerance on nodes, or with the exact contact where that is cheaper, or without nodes."""
-    method, start = replace(system.method, tolerance=tolerance), displacement(system)
-    exact = replace(system, start_error=start, method=method)
-    on_nodes = _on_nodes(replace(exact, method=replace(exact.method, nodes=nodes))) if nodes else exact
+    exact = replace(system.by(tolerance=tolerance), start_error=displacement(system))
+    on_nodes = _on_nodes(exact.by(nodes=nodes)) if nodes else exact
     return exact if exact_is_cheaper(on_nodes, system) else on_nodes
 
 
@@ -157,5 +156,4 @@ def exact_is_cheaper(on_nodes: System, system: System) -> bool:
 
 def _on_nodes(system: System) -> System:
     """The same on nodes, where the method leaves that open."""
-    open_ = system.method.automatic and not system.smooth
-    return replace(system, method=replace(system.method, evaluator="midpoint")) if open_ else system
+    return system.by(evaluator="midpoint") if system.method.automatic and not system.smooth else system

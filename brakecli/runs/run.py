@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 
 from brakecli.about import __version__
 from brakecli.analysis.over_time import OverTime, over_time
-from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import peak, spectrum
-from brakecli.analysis.stability.linear import Theory
 from brakecli.case.read import LoadedCase, with_duration
 from brakecli.case.system import system_of
 from brakecli.files import fields
@@ -25,13 +23,12 @@ from brakecli.files.field import values_of
 from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.judge import DEFAULT, verdict_on
+from brakecli.runs.judge import asked, judged_in_memory, motion_of, refuse_overflow, verdict_on
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
-from brakecli.runs.settled import Judged, settled
-from brakecli.runs.tolerance import certify
-from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import Counted, Motion, Progress, Sink, solve
+from brakecli.runs.settled import settled
+from brakecli.solver.history import History
+from brakecli.solver.motion import Counted, Motion, Progress, Sink
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 from brakecli.solver.track import KINDS, MIN, Track
@@ -133,53 +130,6 @@ def run(
     return report
 
 
-def asked(system: System) -> System:
-    """The same, whose motion carries along what verdicts ask for: events; a disturbance where waves shake it."""
-    shaken = system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0
-    return replace(system, tracked=True, tangents=shaken)
-
-
-def motion_of(
-    system: System, progress: Progress = lambda steps: None, sink: Sink | None = None
-) -> tuple[Motion, Certificate | None]:
-    """The motion of a system: at the step of its method, or to its tolerance, with a certificate.
-
-    Samples go to `sink` where there is one.
-    """
-    if system.method.step is not None:
-        return solve(system, sink=sink, progress=progress), None
-    certified = certify(system, progress)
-    if sink is not None:
-        sink(certified.motion.rows)
-    return certified
-
-
-def verdict_in_memory(
-    motion: Motion,
-    system: System,
-    thresholds: Thresholds = DEFAULT,
-    *,
-    theory: Theory | None = None,
-    in_full: bool = True,
-) -> Verdict:
-    """The verdict on a motion whose samples are in memory."""
-    _refuse_overflow(motion.rows)
-    history = array_history(system.interval, motion.rows)
-    failure, known = motion.work.failure_sentence, (motion.exponent, motion.track)
-    return verdict_on(history, system, failure, *known, thresholds, theory=theory, in_full=in_full)
-
-
-def judged_in_memory(system: System, progress: Progress) -> Judged[Motion]:
-    """The motion of a system, in memory, with its verdict and its certificate."""
-    motion, certificate = motion_of(system, progress)
-    return Judged(verdict_in_memory(motion, system), motion, certificate)
-
-
-def _refuse_overflow(rows: NDArray[np.float64]) -> None:
-    if not np.isfinite(rows).all():  # the loop bounds only the motion itself
-        raise FloatingPointError("a force overflows")
-
-
 def _history_sink(result: ResultFile, interval: float) -> Sink:
     """Declare the history of a file; what is returned writes samples to it."""
     names = " ".join(state.name.lower() for state in ContactState)
@@ -188,7 +138,7 @@ def _history_sink(result: ResultFile, interval: float) -> Sink:
         result.variable("history", field, ("time",), **(states if field.name == "state" else {}))
 
     def append(rows: NDArray[np.float64]) -> None:
-        _refuse_overflow(rows)
+        refuse_overflow(rows)
         done = result.rows("history")
         time = interval * np.arange(done, done + len(rows))
         result.append("history", {"time": time, **dict(zip(HISTORY, rows.T, strict=True))})

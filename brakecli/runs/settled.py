@@ -13,7 +13,7 @@ from brakecli.analysis.regime.table import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.parts import SETTLED
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.cost import beside_seconds, steps_and_seconds
+from brakecli.runs.cost import beside_seconds, guessed
 from brakecli.solver.motion import Work
 from brakecli.solver.system import System
 
@@ -55,7 +55,7 @@ def longest(system: System) -> float:
 
     It goes by guesses and not by the clock, so that a case gives the same bytes wherever it runs.
     """
-    seconds = steps_and_seconds(system)[1] + beside_seconds(system)
+    seconds = guessed(system).seconds + beside_seconds(system)
     times = min(MOST_SECONDS / seconds, MOST_SAMPLES / system.samples)
     return system.sampled_duration * 2.0 ** max(0, math.floor(math.log2(times)))
 

@@ -15,8 +15,8 @@ from brakecli.errors import CaseError, UnreadableResultError
 from brakecli.files import fields
 from brakecli.files.field import plain, values_of
 from brakecli.files.read import open_result
+from brakecli.runs.judge import asked, motion_of, verdict_in_memory
 from brakecli.runs.limits import check
-from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 

@@ -39,8 +39,8 @@ def _runs(system: System) -> Generator[System, Motion, Certified]:
 
     def rung(per_sample: float, more: float) -> System:
         step, more_nodes = system.interval / _few(per_sample), int(nodes * _few(more))
-        method = replace(system.method, scheme="three-layer", theta=NUMEROV, step=step, nodes=more_nodes)
-        return replace(system, method=method, start_error=start_error)
+        run = system.by(scheme="three-layer", theta=NUMEROV, step=step, nodes=more_nodes)
+        return replace(run, start_error=start_error)
 
     def finer(run: System, steps: float, by_nodes: float) -> System | None:
         shorter, more = steps ** (1.0 / ORDER), by_nodes**0.5

@@ -5,7 +5,6 @@ and the finest one is the answer: what two of them differ by is the error of the
 """
 
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -20,7 +19,7 @@ from brakecli.runs.certificate import (
 )
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import ladder
-from brakecli.runs.own_error import certify_by_own_error, last_of
+from brakecli.runs.own_error import by_own_error, last_of
 from brakecli.solver.motion import Motion, Progress, solve
 from brakecli.solver.system import System
 
@@ -40,9 +39,8 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     """
     if system.method.row.exact:
         return _by_phases(system, progress)
-    if system.method.own_steps:
-        return certify_by_own_error(system, lambda rung: _solved(rung, progress))
-    return last_of(ladder(system), lambda rung: _solved(rung, progress))
+    runs = by_own_error(system) if system.method.own_steps else ladder(system)
+    return last_of(runs, lambda rung: _solved(rung, progress))
 
 
 def begins_with_steps(system: System) -> bool:
@@ -50,11 +48,6 @@ def begins_with_steps(system: System) -> bool:
     method = system.method
     chosen = method.automatic and method.own_steps and not method.row.exact
     return chosen and method.tolerance >= NODES_FROM and system.steady
-
-
-def _run(system: System, progress: Progress, **changes: Any) -> Motion:
-    """The motion by the system's method with these changes."""
-    return _solved(replace(system, method=replace(system.method, **changes)) if changes else system, progress)
 
 
 def _solved(system: System, progress: Progress) -> Motion:
@@ -70,7 +63,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     Where that may be too much, a replica with other steps shows what the motion makes of it. Where samples are
     close, a step of this run passes over several of them.
     """
-    wanted, run, longest = system.method.tolerance, _run(system, progress), SHORTER * system.longest_step
+    wanted, run, longest = system.method.tolerance, _solved(system, progress), SHORTER * system.longest_step
     largest, carried = run.work.rounding or (np.zeros(4), np.zeros(4))
     error = max(ROUNDED_MARGIN * float((carried / sizes(system, largest, largest)).max()), ROUNDING)
     if error <= wanted and not run.work.failed:
@@ -79,7 +72,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     every = max(n for n in range(1, 1 + max(1, int(longest / system.interval))) if system.samples % n == 0)
     share = min(1.0, run.system.step / system.longest_step) if every == 1 else 1.0
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
-    other = _run(replica(sparse), lambda samples: None, share=SHORTER * share)
+    other = _solved(replica(sparse).by(share=SHORTER * share), lambda samples: None)
     run.work.solve_seconds += other.work.solve_seconds
     apart = compare(run, other)
     error, failed = ROUNDING_MARGIN * apart.error, run.work.failed or other.work.failed

@@ -50,10 +50,10 @@ def without_waves(system: System, state: Floats) -> Continued:
 
 def _level(flat: System, orbit: Orbit) -> float:
     """Standard deviation (m/s) of vx in a period of a limit cycle."""
-    exact = replace(flat.method, scheme="piecewise-exact", step=orbit.period)
     x, y, v_x, v_y = orbit.state
-    beginning, interval = Initial(x, y, v_x, v_y), orbit.period / SAMPLES
-    once = replace(flat, method=exact, initial=beginning, interval=interval, duration=orbit.period, tracked=False)
+    exact, interval = flat.by(scheme="piecewise-exact", step=orbit.period), orbit.period / SAMPLES
+    beginning = Initial(x, y, v_x, v_y)
+    once = replace(exact, initial=beginning, interval=interval, duration=orbit.period, tracked=False)
     return float(solve(once).rows[1:, V_X].std())
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.stability.modes import Mode, modes
-from brakecli.analysis.stability.report import changes, mean_stiffness
+from brakecli.analysis.stability.report import critical_friction
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError, CaseError, Problem
 from brakecli.runs.limits import within_range
@@ -80,8 +80,8 @@ def _asked(system: System, band: tuple[float, ...] | None) -> tuple[float, float
     mode = _counting(modes(c, k, math.copysign(c.phi, belt)), band)
     if not (rest.is_pressed(system.load_at_start) if rest else system.load_at_start > 0.0 and mode.growth > 0.0):
         raise CaseError([Problem(("load",), UNPRESSED, "press the shoe onto the wheel")])
-    lost = next((each for each in changes(system, mean_stiffness(system, k)) if each.lost), None)
-    return mode.growth, mode.frequency, lost.friction if lost else math.nan
+    critical = critical_friction(system, k)
+    return mode.growth, mode.frequency, math.nan if critical is None else critical
 
 
 def _counting(found: list[Mode], band: tuple[float, ...] | None) -> Mode:

@@ -1,7 +1,7 @@
 """A system: the numbers of a case that the solver works on, and the method that the case asks for."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from typing import Any
 
@@ -77,6 +77,10 @@ class System:
     tracked: bool = False  # whether the loop notes works of parts, and events
     start_error: tuple[float, float] | None = None  # of x and y, m; where given, the error is carried along
     most_error: float = math.inf  # relative to the motion so far, beyond which such a run ends
+
+    def by(self, **changes: Any) -> "System":
+        """The same, with these changes of its method."""
+        return replace(self, method=replace(self.method, **changes))
 
     @cached_property
     def pad(self) -> Pad:

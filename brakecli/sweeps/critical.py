@@ -25,7 +25,7 @@ from brakecli.errors import CaseError
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.lyapunov import Steady, by_exponents
-from brakecli.sweeps.read_off import calm, explored, on_waves
+from brakecli.sweeps.read_off import explored, on_waves
 from brakecli.sweeps.sustained import sustained
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined, of_edges
@@ -64,15 +64,9 @@ def search(
         found = on_waves(critical, answers) if repeats else by_exponents(critical, steady_at)
         found = found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
-    def unstable(value: float) -> bool | None:
-        if found.outcome is Outcome.FOUND:
-            return value >= found.upper
-        known = found.outcome in (Outcome.REGAINED, Outcome.STABLE, Outcome.UNSTABLE)
-        return any(low <= value <= high for low, high in found.windows) if known else None
-
-    lasting = sustained(explorer.line, critical.tolerance, found, unstable, partial(calm, answers), verdict_of)
+    lasting = sustained(answers, critical.tolerance, found, verdict_of)
     coexists = [answers.coexists_from]
-    if lasting.at is not None and unstable(lasting.at) is False:
+    if lasting.at is not None and found.unstable_at(lasting.at) is False:
         notes = [*explorer.notes]
         explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
         explorer.notes = notes  # a user has given no motion

@@ -5,7 +5,7 @@ from math import prod
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.stability.report import LARGEST_FRICTION, changes, mean_stiffness
+from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.limits import within_range
@@ -19,8 +19,8 @@ _FRICTION = ("friction", "coefficient")
 def margins(plan: Plan) -> NDArray[np.float64] | None:
     """Critical friction less friction at every point of the grid, by eigenvalues; None where it would take long.
 
-    What no friction makes unstable is critical at the largest friction searched; with a wheel at rest, or numbers
-    out of range, it is NaN.
+    What is never stable is critical at 0, what no friction makes unstable at the largest friction searched. With a
+    wheel at rest, or numbers out of range, it is NaN.
     """
     settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= 10**5 else []
     others = {tuple(value for path, value in each.items() if path != _FRICTION): each for each in settings}
@@ -43,7 +43,7 @@ def _critical(plan: Plan, settings: dict[tuple[str, ...], object]) -> float:
         return np.nan
     try:
         with within_range():
-            found = changes(system, mean_stiffness(system, system.contact_stiffness))
+            found = critical_friction(system, system.contact_stiffness)
     except RefusedError:
         return np.nan
-    return next((each.friction for each in found if each.lost), LARGEST_FRICTION)
+    return LARGEST_FRICTION if found is None else found

@@ -13,9 +13,9 @@ from dataclasses import dataclass, field
 from time import process_time
 
 from brakecli.runs.certificate import Certified
-from brakecli.runs.cost import beside_seconds, stability_seconds
+from brakecli.runs.cost import stability_seconds
 from brakecli.runs.limits import Check, within_range
-from brakecli.runs.pilot import measured
+from brakecli.runs.price import measured
 from brakecli.runs.together import TOGETHER, certify_together, loops
 from brakecli.solver.lanes.records import LANES
 from brakecli.solver.system import MOST_STEPS
@@ -184,7 +184,7 @@ class Pilot:
                 self.begun = True
                 return self._guess(point.check)
             self.begun |= price.at_least
-            return price.seconds + beside_seconds(system)
+            return price.seconds
         begin = process_time()
         self._point(point, None)
         return process_time() - begin

@@ -24,8 +24,8 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
+from brakecli.runs.judge import asked, motion_of, verdict_in_memory
 from brakecli.runs.limits import Check, check, refuse, within_range
-from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.runs.settled import Judged, settled
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.solver.motion import Motion

@@ -1,7 +1,7 @@
 """From which value of a parameter on vibration lasts from the case's own start."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
@@ -12,8 +12,9 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
+from brakecli.branches.answers import Answers
 from brakecli.branches.begin import FADES, UNKNOWN, End, on_smooth_pads
-from brakecli.branches.line import Line, Shoe
+from brakecli.branches.line import Shoe
 from brakecli.branches.problem import Array
 from brakecli.branches.rough_end import on_rough_pads
 from brakecli.case.case import Case, changed
@@ -23,6 +24,7 @@ from brakecli.runs.limits import within_range
 from brakecli.solver.period import common_period
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
+from brakecli.sweeps.read_off import calm
 from brakecli.sweeps.windows import Outcome, Search
 
 GALLOP = 2.0
@@ -48,24 +50,20 @@ class Lasting(NamedTuple):
 
 
 def sustained(
-    line: Line,
-    tolerance: float,
-    found: Search,
-    unstable: Callable[[float], bool | None],
-    calm: Callable[[float], Sequence[Array]],
-    verdict_of: Callable[[Case], Verdict | None],
+    answers: Answers, tolerance: float, found: Search, verdict_of: Callable[[Case], Verdict | None]
 ) -> Lasting:
     """Look for the least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
     From where stability is lost, as was `found`, the search strides down, ever faster, and then narrows down by
-    halves. `unstable` says of a value whether sliding is known to be: vibration lasts there without a run. `calm`
-    gives the states at t = 0 of the stable motions that a rough wheel forces there and that are no vibrations.
+    halves. Where sliding is known to be unstable, vibration lasts without a run. `answers` know the stable motions
+    that a rough wheel forces and that are no vibrations.
     """
+    line = answers.line
     low, high = line.low, line.high
 
     @cache
     def end(value: float) -> End:
-        return LASTS if unstable(value) else _end(line.case_at(line.place(value)), calm, value, verdict_of)
+        return LASTS if found.unstable_at(value) else _end(answers, value, verdict_of)
 
     def ended(value: float | None, outcome: Outcome) -> Lasting:
         shown = [each for each in seen if end(each).state is not None]
@@ -95,17 +93,13 @@ def sustained(
     return ended(0.5 * (fading + lasting), Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
 
 
-def _end(
-    case: Case,
-    calm: Callable[[float], Sequence[Array]],
-    value: float,
-    verdict_of: Callable[[Case], Verdict | None],
-) -> End:
+def _end(answers: Answers, value: float, verdict_of: Callable[[Case], Verdict | None]) -> End:
     """What the case's own start comes to: by the flow of the equations, whatever scheme the case has.
 
     Runs of the case decide where no motion repeats, no dashpot damps, no link holds the shoe or the wheel rests,
     and where speed or load change.
     """
+    case = answers.line.case_at(answers.line.place(value))
     with within_range():
         system = system_of(case)
     waves = bool(system.wheel.g.size)
@@ -120,7 +114,7 @@ def _end(
         rest = steady_sliding(system)
     except CaseError:
         return UNKNOWN
-    known = calm(value) if waves else [np.array([rest.x, rest.y, 0.0, 0.0])]
+    known = calm(answers, value) if waves else [np.array([rest.x, rest.y, 0.0, 0.0])]
     return on_rough_pads(system, system.initial.beside((rest.x, rest.y)), known)
 
 

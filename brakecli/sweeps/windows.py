@@ -57,6 +57,13 @@ class Search(NamedTuple):
         ends = ("lower", "upper")
         return {end + of: [each[k] for each in found[of]] for of in found for k, end in enumerate(ends)}
 
+    def unstable_at(self, value: float) -> bool | None:
+        """Whether sliding is unstable at a value of the parameter; None where that is not known."""
+        if self.outcome is Outcome.FOUND:
+            return value >= self.upper
+        known = self.outcome in (Outcome.REGAINED, Outcome.STABLE, Outcome.UNSTABLE)
+        return any(low <= value <= high for low, high in self.windows) if known else None
+
 
 class Edge(NamedTuple):
     """Where stability is lost, or regained, with its error bar; or where it is not known any more."""

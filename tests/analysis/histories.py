@@ -13,7 +13,7 @@ from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
-from brakecli.runs.run import asked, verdict_in_memory
+from brakecli.runs.judge import asked, verdict_in_memory
 from brakecli.solver.history import History, array_history
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY, ContactState

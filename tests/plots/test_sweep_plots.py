@@ -14,6 +14,7 @@ from matplotlib.contour import ContourSet
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
+from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.files.read import open_result
@@ -22,11 +23,13 @@ from brakecli.plots.axis import Axis
 from brakecli.plots.result import draw, plot_result
 from brakecli.plots.style import applied, headed, prefixed, readable, rendered
 from brakecli.plots.sweep import REGIMES
+from brakecli.sweeps.margin import margins
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
+from tests.examples import NEVER_STABLE, SQUEAL, make
 from tests.plots.helpers import ANGLE, CRITICAL, SCHEME, SPEED, columns, drawn, gathered, legend, line, write
-from tests.sweeps.helpers import inline
+from tests.sweeps.helpers import frictions, inline, write_sweep
 
 
 def test_each_suffix_gives_a_whole_picture_and_the_same_bytes_again(tmp_path: Path) -> None:
@@ -268,6 +271,11 @@ def test_the_line_of_critical_friction_is_the_closed_form(tmp_path: Path) -> Non
     assert line_at(along, "critical friction") == pytest.approx(expected[1], rel=1e-6)
 
 
+def test_no_friction_is_below_the_critical_one_of_a_shoe_that_is_never_stable(tmp_path: Path) -> None:
+    plan = write_sweep(tmp_path, frictions(4), case=resolved_toml(make(SQUEAL, **NEVER_STABLE))).plan
+    assert margins(plan) == pytest.approx(-np.linspace(0.1, 1.0, 4))
+
+
 def line_at(axes: Any, label: str) -> float:
     return float(line(axes, label).get_xdata()[0])
 
@@ -299,9 +307,9 @@ def test_sweeps_of_any_values_are_drawn(tmp_path: Path, every: int) -> None:
         lambda count: np.full(count, 7e6),
         lambda count: np.geomspace(1e-12, 1e3, count),
     ]
-    for axes, critical, make in list(product(([ANGLE], [SPEED, ANGLE]), (False, True), values))[::every]:
+    for axes, critical, drawn_by in list(product(([ANGLE], [SPEED, ANGLE]), (False, True), values))[::every]:
         shape = (8,) if len(axes) == 1 else (7, 8)
-        same = make(math.prod(shape)).reshape(shape)
+        same = drawn_by(math.prod(shape)).reshape(shape)
         changed = columns(shape, critical=critical) | {"amplitude": same, "frequency": same}
         if critical:
             changed |= {"critical": same, "critical_eigenvalue": same, "critical_sustained": same}

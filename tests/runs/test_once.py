@@ -20,8 +20,8 @@ from tests.commands import ROOT, TINY
 from tests.examples import ROUGH, make
 
 ASKED = {
-    "price": ("brakecli.runs.cost", "steps_and_seconds"),
-    "pilot": ("brakecli.runs.pilot", "measured"),
+    "price": ("brakecli.runs.cost", "guessed"),
+    "pilot": ("brakecli.runs.price", "measured"),
     "limits": ("brakecli.runs.limits", "check"),
     "modes and forced motion": ("brakecli.analysis.stability.linear", "linear_theory"),
     "tables of the contact": ("brakecli.solver.contact.pad", "build_pad"),

@@ -16,7 +16,7 @@ from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.front.inputs import load_case
 from brakecli.runs import own_error
-from brakecli.runs.own_error import SAFETY, Known, certify_by_own_error
+from brakecli.runs.own_error import SAFETY, Known, by_own_error, last_of
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
@@ -129,7 +129,7 @@ def test_a_run_says_how_fine_the_next_one_has_to_be() -> None:
             tried.append(rung)
             return solve(rung)
 
-        found = certify_by_own_error(system, run).certificate
+        found = last_of(by_own_error(system), run).certificate
         assert found.certified
         assert len(tried) <= most
         assert found.by_steps is not None
@@ -151,7 +151,7 @@ def far_too_coarse() -> tuple[System, Callable[[System], Motion], list[Motion]]:
 
 def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
     system, run, tried = far_too_coarse()
-    assert certify_by_own_error(system, run).certificate.certified
+    assert last_of(by_own_error(system), run).certificate.certified
     first, last = tried
     assert first.work.failure is Failure.COARSE
     assert first.work.failure_time == pytest.approx((len(first.rows) - 1) * system.interval)
@@ -165,7 +165,7 @@ def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
 def test_where_nothing_finer_helps_the_last_run_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(own_error, "_FINEST", 1.0)  # times `_BEYOND` it is more than the first run has
     system, run, tried = far_too_coarse()
-    found = certify_by_own_error(system, run)
+    found = last_of(by_own_error(system), run)
     assert [each.work.failure for each in tried] == [Failure.COARSE, Failure.NONE]
     assert not found.certificate.certified
     assert found.motion is tried[-1]
@@ -176,7 +176,7 @@ def test_where_nothing_finer_helps_the_last_run_is_whole(monkeypatch: pytest.Mon
 @pytest.mark.parametrize("displaced", [1e290, 1e308])
 def test_an_error_that_overflows_is_no_promise(monkeypatch: pytest.MonkeyPatch, displaced: float) -> None:
     monkeypatch.setattr(own_error, "displacement", lambda system: (displaced, -displaced))
-    found = certify_by_own_error(system_of(promised(OPEN, 1e-2, solver__duration=0.001)), solve).certificate
+    found = last_of(by_own_error(system_of(promised(OPEN, 1e-2, solver__duration=0.001))), solve).certificate
     assert not found.certified
     assert found.estimated_error > 1e-2
     assert found.certified_until == 0.0
@@ -184,7 +184,7 @@ def test_an_error_that_overflows_is_no_promise(monkeypatch: pytest.MonkeyPatch, 
 
 def test_a_promise_that_no_run_keeps_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(own_error, "_MOST_RUNS", 1)
-    found = certify_by_own_error(system_of(promised(OPEN, 1e-6, solver__duration=0.01)), solve).certificate
+    found = last_of(by_own_error(system_of(promised(OPEN, 1e-6, solver__duration=0.01))), solve).certificate
     assert not found.certified
     assert found.estimated_error > 1e-6
     assert 0.0 <= found.certified_until < 0.01
@@ -200,13 +200,13 @@ def test_a_motion_says_by_how_much_it_amplifies(friction: float) -> None:
     weights, start = np.array([rate, rate, 1.0, 1.0]), np.array([0.5 / rate, 0.5 / rate, 0.5, -0.5])
     ends = 0.5 * np.arange(1, 513) / 512  # of the parts in which growth is noted
     exact = max(1.0, *(float(np.linalg.norm(weights * (expm(a * end) @ start))) for end in ends))
-    found = certify_by_own_error(system, solve).certificate
+    found = last_of(by_own_error(system), solve).certificate
     assert found.amplification == pytest.approx(exact, rel=0.02)
 
 
 def test_where_so_many_nodes_are_needed_the_exact_contact_is_taken() -> None:
     system = system_of(promised(OPEN, 1e-9, solver__duration=0.001))
-    found = certify_by_own_error(system, solve)
+    found = last_of(by_own_error(system), solve)
     assert found.certificate.certified
     assert found.motion.system.evaluator == "exact"
     assert found.certificate.by_nodes == 0.0

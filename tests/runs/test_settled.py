@@ -18,8 +18,8 @@ from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.files.read import open_result
 from brakecli.runs.advise import advise
+from brakecli.runs.judge import asked, motion_of, verdict_in_memory
 from brakecli.runs.limits import check
-from brakecli.runs.run import asked, motion_of, verdict_in_memory
 from brakecli.runs.settled import MOST_SAMPLES, Judged, Settled, longest, settled
 from brakecli.solver.motion import Motion
 from brakecli.solver.quantities import Failure

@@ -14,6 +14,7 @@ from scipy import stats
 import brakecli
 from brakecli.analysis.probability import Probability
 from brakecli.analysis.stability.report import stability
+from brakecli.case.case import resolved_toml
 from brakecli.case.system import system_of
 from brakecli.case.tables import json_schema
 from brakecli.errors import BrakecliError, CaseError, UsageError
@@ -25,6 +26,7 @@ from brakecli.scattering.study import SCRAMBLINGS, Parameter, Study
 from tests.campaign import counts
 from tests.commands import ROOT, TINY, left_in
 from tests.commands import brakecli as command
+from tests.examples import NEVER_STABLE, SQUEAL, make
 
 pytestmark = pytest.mark.usefixtures("compiled")
 CASE = ROOT / "cases" / "relaxation.toml"
@@ -370,6 +372,13 @@ def test_a_shoe_that_locks_itself_is_unstable_and_past_its_critical_friction(tmp
     assert 0 < beyond.sum() < 64
     assert ((report.growth_rate > 0.0).to_numpy() == beyond).all()
     assert float(report.probability.sel(outcome="critical_below")) == beyond.mean()
+
+
+def test_a_shoe_that_is_never_stable_has_a_critical_friction_of_zero(tmp_path: Path) -> None:
+    case = resolved_toml(make(SQUEAL, **NEVER_STABLE))
+    report = brakecli.scatter(write_study(tmp_path, FRICTION, "samples = 64", 'indices_of = "none"', case=case))
+    assert report.critical_friction.to_numpy().tolist() == [0.0] * 64
+    assert float(report.probability.sel(outcome="critical_below")) == 1.0
 
 
 def test_what_is_not_known_may_squeal_or_not(tmp_path: Path) -> None:

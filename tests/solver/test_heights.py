@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from brakecli.case.system import system_of
-from brakecli.runs.cost import steps_and_seconds
+from brakecli.runs.cost import guessed
 from brakecli.solver import contact
 from brakecli.solver.contact import pad as pads
 from brakecli.solver.contact.pad import Pad, build_layer, build_pad, interpolation_error, window_rows
@@ -155,7 +155,7 @@ METHODS = (
 def test_a_run_is_that_of_sums(method: Method, monkeypatch: pytest.MonkeyPatch) -> None:
     rough = system_of(make(ROUGH, roughness__wheel=MANY, load__force=3000.0))
     rough = replace(rough, method=method, duration=0.005)
-    one, seconds = solve(rough), steps_and_seconds(rough)[1]
+    one, seconds = solve(rough), guessed(rough).seconds
     assert rough.window_rows > 0
     monkeypatch.setattr(pads, "MOST_SUMMED", 30)
     rough = replace(rough)  # makes its pad anew, as it is too large to be kept
@@ -169,4 +169,4 @@ def test_a_run_is_that_of_sums(method: Method, monkeypatch: pytest.MonkeyPatch) 
     assert abs(one.energy.relative_closing_error) < 1e-4
     assert one.work.steps == other.work.steps
     if not method.own_steps:  # the guess of `check` knows it
-        assert seconds < 0.25 * steps_and_seconds(rough)[1]
+        assert seconds < 0.25 * guessed(rough).seconds

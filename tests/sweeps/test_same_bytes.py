@@ -9,7 +9,7 @@ from brakecli.cli.app import app
 from brakecli.errors import RefusedError
 from brakecli.files.read import open_result
 from brakecli.runs import limits
-from brakecli.runs.pilot import Price
+from brakecli.runs.cost import Price
 from brakecli.sweeps.point import checked
 from brakecli.sweeps.workers.task import compute_units
 from tests.commands import brakecli, left_in
@@ -90,7 +90,7 @@ def test_a_refused_point_says_nothing_that_was_measured(monkeypatch: pytest.Monk
     """Whatever a pilot run has cost here, its record is the same."""
     said = set[str]()
     for seconds in (1e6, 2e6):
-        monkeypatch.setattr(limits, "measured", lambda system, seconds=seconds: Price(7, seconds, at_least=False))
+        monkeypatch.setattr(limits, "measured", lambda system, seconds=seconds: Price(7, seconds))
         with pytest.raises(RefusedError) as refused:
             checked(make(ROUGH, solver__duration=1e7, solver__step=1e-5, output__sample_interval=1.0))
         said.add(str(refused.value))

@@ -8,12 +8,15 @@ import pytest
 
 from brakecli.analysis.regime.table import Decision, Regime
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.branches.answers import Answers
 from brakecli.branches.begin import on_smooth_pads, settled
 from brakecli.branches.cycles import Cycles
-from brakecli.branches.line import Line, Shoe
+from brakecli.branches.line import Shoe
 from brakecli.case.system import system_of
 from brakecli.solver.flow.smooth import SmoothFlow
-from brakecli.sweeps.sustained import _end, sustained
+from brakecli.sweeps.read_off import explored
+from brakecli.sweeps.sustained import _by_runs, sustained
+from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign
 from tests.examples import SQUEAL, make
@@ -211,18 +214,17 @@ def test_without_a_common_period_a_vibration_lasts_that_keeps_its_amplitude(
 ) -> None:
     waves = {"amplitudes": [1e-6, 1e-6], "wavelengths": [0.02, 0.02 / math.sqrt(2.0)]}
     case, told = make(SQUEAL, roughness__wheel=waves), iter(amplitudes)
-    end = _end(case, lambda value: [], 0.5, lambda case: verdict(next(told)))
+    end = _by_runs(case, system_of(case), lambda case: verdict(next(told)))
     assert end.lasts is lasts
-    undecided = _end(case, lambda value: [], 0.5, lambda case: verdict(1.0, Regime.UNDECIDED))
-    damped = _end(case, lambda value: [], 0.5, lambda case: verdict(1.0, Regime.DAMPED))
+    undecided = _by_runs(case, system_of(case), lambda case: verdict(1.0, Regime.UNDECIDED))
+    damped = _by_runs(case, system_of(case), lambda case: verdict(1.0, Regime.DAMPED))
     assert (undecided.lasts, damped.lasts) == (None, False)
 
 
 def test_the_vibration_that_lasts_lowest_down_is_handed_on() -> None:
-    line = Line(make(SQUEAL), ["friction.coefficient"], 0.3, 0.9)
-    answer = sustained(
-        line, 1e-2, Search(Outcome.UNSTABLE), lambda value: None, lambda value: [], lambda case: None
-    )
+    critical = Critical(parameter="friction.coefficient", lower=0.3, upper=0.9)
+    answers = Answers(explored(critical, make(SQUEAL)).explored, None)
+    answer, line = sustained(answers, 1e-2, Search(Outcome.UNSTABLE), lambda case: None), answers.line
     assert answer.outcome is Outcome.FOUND
     assert answer.value is not None
     assert answer.state is not None

@@ -14,14 +14,13 @@ from pydantic import ValidationError
 
 from brakecli.analysis.stability.edges import edges
 from brakecli.analysis.stability.modes import growth
-from brakecli.analysis.stability.report import LARGEST_FRICTION, changes, mean_stiffness
+from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction
 from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case
 from brakecli.case.read import put
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError, printable
 from brakecli.faces import argument
-from brakecli.solver.links import natural_frequencies
 from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
 KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
@@ -108,12 +107,8 @@ def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
             rest = steady_sliding(system, mean=tabulated(system))
             k = rest.stiffness if rest.is_pressed(system.load_at_start) else 0.0
         if belt != 0.0 and k > 0.0:
-            found = changes(system, mean_stiffness(system, k), up_to)
-            rate = growth(c, k, math.copysign(c.phi, belt)) if rest else None
-            unstable = rate is not None and rate > 1e-9 * natural_frequencies(c, k)[1]
-            never = not found[0].lost if found else unstable
-            critical = 0.0 if never else next((each.friction for each in found if each.lost), None)
-            return Answer(critical, rate)
+            critical = critical_friction(system, k, up_to)
+            return Answer(critical, growth(c, k, math.copysign(c.phi, belt)) if rest else None)
     return None
 
 

@@ -10,7 +10,16 @@ from itertools import pairwise
 import numpy as np
 
 from brakecli.analysis.stability.discrete import spectral_radius
-from brakecli.analysis.stability.modes import Complex, Crossing, Mode, crossings, eigensystem, is_undamped, modes
+from brakecli.analysis.stability.modes import (
+    Complex,
+    Crossing,
+    Mode,
+    crossings,
+    eigensystem,
+    growth,
+    is_undamped,
+    modes,
+)
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
@@ -99,6 +108,22 @@ def changes(system: System, stiffness_at: StiffnessAt, up_to: float = LARGEST_FR
     if belt == 0.0 or system.smooth:
         return crossings(c, stiffness_at(c.phi), belt)
     return _rough_crossings(c, belt, stiffness_at, up_to)
+
+
+def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_FRICTION) -> float | None:
+    """Largest friction coefficient up to which sliding is stable, 0 where it never is, or None where it always is.
+
+    `stiffness` (N/m): that of steady sliding, or of full contact where there is none. Where stability changes
+    nowhere, the growth at the system's own friction decides. The wheel turns.
+    """
+    c, stiffness_at = system.coefficients, mean_stiffness(system, stiffness)
+    if found := changes(system, stiffness_at, up_to):
+        return found[0].friction if found[0].lost else 0.0
+    k = stiffness_at(c.phi)
+    if not k > 0.0:
+        return None
+    grows = growth(c, k, math.copysign(c.phi, system.belt_speed)) > 1e-9 * natural_frequencies(c, k)[1]
+    return 0.0 if grows else None
 
 
 def is_stable(system: System) -> bool | None:
