@@ -4,7 +4,7 @@ import numpy as np
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import context
-from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.measure import Continued, Given
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
@@ -24,13 +24,21 @@ def verdict_on(
     track: Track | None = None,
     thresholds: Thresholds = DEFAULT,
     *,
-    theory: Theory | None = None,
     in_full: bool = True,
 ) -> Verdict:
-    """The verdict on a motion; where a row may need it, it is continued on the smooth wheel.
+    """The verdict on a motion; where a row may need it, it is continued on the smooth wheel."""
+    return classify([given(history, system, failure, exponent, track)], thresholds, in_full=in_full)[0]
 
-    `theory` is given where it is known already.
-    """
+
+def given(
+    history: History,
+    system: System,
+    failure: str | None,
+    exponent: Exponent | None = None,
+    track: Track | None = None,
+    theory: Theory | None = None,
+) -> Given:
+    """What is known of a motion that is to be judged; `theory` is given where it is known already."""
 
     def continued() -> Continued:
         from brakecli.runs.without_waves import without_waves  # kernels that a linear motion does not need
@@ -39,13 +47,4 @@ def verdict_on(
         state = [float(history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return without_waves(system, np.array(state))
 
-    return classify(
-        history,
-        context(system, theory),
-        thresholds,
-        exponent=exponent,
-        track=track or UNTRACKED,
-        continued=continued,
-        failure=failure,
-        in_full=in_full,
-    )
+    return Given(history, context(system, theory), exponent, track or UNTRACKED, continued, failure or "")

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 
 from brakecli.about import __version__
 from brakecli.analysis.over_time import OverTime, over_time
+from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.measure import Given
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import peak, spectrum
@@ -25,7 +27,7 @@ from brakecli.files.field import values_of
 from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.judge import DEFAULT, verdict_on
+from brakecli.runs.judge import DEFAULT, given, verdict_on
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.settled import Judged, settled
@@ -154,19 +156,16 @@ def motion_of(
     return certified
 
 
-def verdict_in_memory(
-    motion: Motion,
-    system: System,
-    thresholds: Thresholds = DEFAULT,
-    *,
-    theory: Theory | None = None,
-    in_full: bool = True,
-) -> Verdict:
+def verdict_in_memory(motion: Motion, system: System, thresholds: Thresholds = DEFAULT) -> Verdict:
     """The verdict on a motion whose samples are in memory."""
+    return classify([in_memory(motion, system)], thresholds)[0]
+
+
+def in_memory(motion: Motion, system: System, theory: Theory | None = None) -> Given:
+    """A motion to be judged whose samples are in memory; raises FloatingPointError where one overflows."""
     _refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)
-    failure, known = motion.work.failure_sentence, (motion.exponent, motion.track)
-    return verdict_on(history, system, failure, *known, thresholds, theory=theory, in_full=in_full)
+    return given(history, system, motion.work.failure_sentence, motion.exponent, motion.track, theory)
 
 
 def judged_in_memory(system: System, progress: Progress) -> Judged[Motion]:

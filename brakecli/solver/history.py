@@ -1,6 +1,6 @@
 """A time history as the analysis sees it: read in pieces, since a long one does not fit into memory."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,10 +17,20 @@ class History:
 
     interval: float  # s
     samples: int
-    read: Callable[[str, int, int], NDArray[np.float64]]  # the samples start … stop - 1 of a variable, SI units
+    read: Callable[[str, int, int], NDArray[np.float64]]  # the samples start … stop - 1 of a variable, SI units;
+    # of many histories at once, a row for each
 
 
 def array_history(interval: float, rows: NDArray[np.float64]) -> History:
     """A history in memory: rows of `quantities.HISTORY`."""
     columns = dict(zip(HISTORY, rows.T, strict=True))
     return History(interval, len(rows), lambda name, start, stop: columns[name][start:stop])
+
+
+def stacked(histories: Sequence[History]) -> History:
+    """Histories at once that have the same interval and as many samples."""
+
+    def read(name: str, start: int, stop: int) -> NDArray[np.float64]:
+        return np.concatenate([each.read(name, start, stop) for each in histories]).reshape(len(histories), -1)
+
+    return History(histories[0].interval, histories[0].samples, read)
