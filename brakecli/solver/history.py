@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +29,13 @@ def array_history(interval: float, rows: NDArray[np.float64]) -> History:
 
 
 def stacked(histories: Sequence[History]) -> History:
-    """Histories at once that have the same interval and as many samples."""
+    """Many histories at once, which have the same interval and as many samples."""
+    interval, samples, read = histories[0].interval, histories[0].samples, histories[0].read
+    if len(histories) == 1:  # which may be too long for memory
+        return History(interval, samples, lambda *given: read(*given)[None])
 
-    def read(name: str, start: int, stop: int) -> NDArray[np.float64]:
-        return np.concatenate([each.read(name, start, stop) for each in histories]).reshape(len(histories), -1)
+    @cache
+    def column(name: str) -> NDArray[np.float64]:
+        return np.array([each.read(name, 0, samples) for each in histories])
 
-    return History(histories[0].interval, histories[0].samples, read)
+    return History(interval, samples, lambda name, start, stop: column(name)[:, start:stop])

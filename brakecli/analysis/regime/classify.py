@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 from brakecli.analysis.regime.answers import Answers
@@ -37,7 +36,7 @@ def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *,
     part, radius, cycles, look = what.part, shown.context.radius, what.cycles, shown.seen
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
-        found = replace(found, frequency=what.frequency or math.nan)
+        found = found._replace(frequency=what.frequency or math.nan)
     evidence: dict[str, Any] = {"row": decision.row}
     if in_full:
         evidence |= found.known() | what.evidence | _further(shown, what, shown.context)

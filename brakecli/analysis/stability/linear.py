@@ -145,15 +145,17 @@ def _extremes(theory: Linear, waves: Complex, span: float) -> tuple[Array, Array
     begins, turns, inside, near = _blocks(tuple(theory.passing.tolist()), span)
     begins = waves[:, :, None] * begins
     rows = np.concatenate([begins.imag, begins.real], axis=1).swapaxes(1, 2).astype(np.float32, order="C")
-    found, each = np.empty((2, len(waves))), np.arange(rows.shape[1])
-    for place, row in enumerate(rows):  # one at a time, which stays in the cache
+    peaks, sizes, each = list[Any](), list[Any](), np.arange(rows.shape[1])
+    for row in rows:  # one at a time, which stays in the cache
         x = (row.reshape(-1, _FEW, row.shape[1]) @ inside).reshape(len(row), -1)
-        ups, downs = x.argmax(axis=1), x.argmin(axis=1)  # in half the time of max and min
-        high, low = x[each, ups].argsort()[-_HIGHEST:], x[each, downs].argsort()[:_HIGHEST]
-        first = begins[place]
-        tops = first[:, high] * turns[:, ups[high]], first[:, low] * turns[:, downs[low]]
-        found[:, place] = (tops[0].T @ near).imag.max(), (tops[1].T @ near).imag.min()
-    return found[0], found[1]
+        peaks.append((x.argmax(axis=1), x.argmin(axis=1)))  # in half the time of max and min
+        sizes.append([x[each, time] for time in peaks[-1]])
+    order = np.array(sizes).argsort(axis=2)
+    highest = np.stack([order[:, 0, -_HIGHEST:], order[:, 1, :_HIGHEST]], axis=1)
+    times = np.take_along_axis(np.array(peaks), highest, axis=2)
+    tops = np.take_along_axis(begins[:, None], highest[:, :, None], axis=3) * np.moveaxis(turns[:, times], 0, 2)
+    found = (tops.swapaxes(2, 3) @ near).imag
+    return found[:, 0].max(axis=(1, 2)), found[:, 1].min(axis=(1, 2))
 
 
 @lru_cache(maxsize=1)  # the points of a sweep ask for the same ones
