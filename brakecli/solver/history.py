@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from brakecli.solver.quantities import HISTORY
 
 ROW_BYTES = 8 * len(HISTORY) + 1  # of a stored sample: the time, the variables, and the state in one byte
+_PLACES = {name: place for place, name in enumerate(HISTORY)}
 
 
 @dataclass(frozen=True)
@@ -24,8 +25,7 @@ class History:
 
 def array_history(interval: float, rows: NDArray[np.float64]) -> History:
     """A history in memory: rows of `quantities.HISTORY`."""
-    columns = dict(zip(HISTORY, rows.T, strict=True))
-    return History(interval, len(rows), lambda name, start, stop: columns[name][start:stop])
+    return History(interval, len(rows), lambda name, start, stop: rows[start:stop, _PLACES[name]])
 
 
 def stacked(histories: Sequence[History]) -> History:

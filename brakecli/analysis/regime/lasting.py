@@ -228,7 +228,8 @@ def _surely(change: tuple[float, float], limits: Thresholds) -> float:
 def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
     """What nodes and steps change in a motion forced on lines (Hz), or in one that lasts by itself."""
     context, part = shown.context, found.part
-    ripple = context.ripple(part, lines) if not found.cycles else None
+    opens = shown.seen.full_from > part.start  # otherwise it has none
+    ripple = context.ripple(part, lines) if opens and not found.cycles else None
     if found.spread is not None and lines and not (shown.linear and found.forced == found.amplitude):
         found.spread += found.amplitude * context.detuned(part, lines) + (ripple.size if ripple else 0.0)
     if ripple and ripple.counts:
