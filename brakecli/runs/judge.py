@@ -1,33 +1,14 @@
-"""The verdict on a motion, with what is asked of its case."""
+"""What is to be judged of a motion, with what is asked of its case."""
 
 import numpy as np
 
-from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import context
 from brakecli.analysis.regime.measure import Continued, Given
-from brakecli.analysis.regime.table import Thresholds
-from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Track
-
-DEFAULT = Thresholds()
-
-
-def verdict_on(
-    history: History,
-    system: System,
-    failure: str | None,
-    exponent: Exponent | None = None,
-    track: Track | None = None,
-    thresholds: Thresholds = DEFAULT,
-    *,
-    in_full: bool = True,
-) -> Verdict:
-    """The verdict on a motion; where a row may need it, it is continued on the smooth wheel."""
-    return classify([given(history, system, failure, exponent, track)], thresholds, in_full=in_full)[0]
 
 
 def given(
@@ -38,7 +19,10 @@ def given(
     track: Track | None = None,
     theory: Theory | None = None,
 ) -> Given:
-    """What is known of a motion that is to be judged; `theory` is given where it is known already."""
+    """What is known of a motion that is to be judged; `theory` is given where it is known already.
+
+    Where a row of the verdict may need it, the motion is continued on the smooth wheel.
+    """
 
     def continued() -> Continued:
         from brakecli.runs.without_waves import without_waves  # kernels that a linear motion does not need

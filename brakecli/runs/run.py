@@ -27,7 +27,7 @@ from brakecli.files.field import values_of
 from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.judge import DEFAULT, given, verdict_on
+from brakecli.runs.judge import given
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.settled import Judged, settled
@@ -37,6 +37,8 @@ from brakecli.solver.motion import Counted, Motion, Progress, Sink, solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 from brakecli.solver.track import KINDS, MIN, Track
+
+_DEFAULT = Thresholds()
 
 
 @dataclass(frozen=True)
@@ -115,9 +117,8 @@ def run(
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            verdict = known or verdict_on(
-                history, system, motion.work.failure_sentence, motion.exponent, motion.track
-            )
+            seen = motion.work.failure_sentence, motion.exponent, motion.track
+            verdict = known or classify([given(history, system, *seen)])[0]
             top = _write_spectrum(result, history, verdict)
             changing = None if motion.work.failed else over_time(history, system)
             if changing:
@@ -156,7 +157,7 @@ def motion_of(
     return certified
 
 
-def verdict_in_memory(motion: Motion, system: System, thresholds: Thresholds = DEFAULT) -> Verdict:
+def verdict_in_memory(motion: Motion, system: System, thresholds: Thresholds = _DEFAULT) -> Verdict:
     """The verdict on a motion whose samples are in memory."""
     return classify([in_memory(motion, system)], thresholds)[0]
 

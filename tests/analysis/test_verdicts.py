@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import tomli_w
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.analysis.stability.linear import linear_theory, parts
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.runs.judge import verdict_on
+from brakecli.runs.judge import given
 from brakecli.solver.history import array_history
 from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
@@ -283,7 +284,7 @@ def test_a_stop_is_not_called_settled() -> None:
 def test_a_failed_run_is_neither_forced_nor_settled() -> None:
     case = make(DRUM, solver__duration=2.0)
     motion = array_history(1e-4, simulate(case).rows)
-    verdict = verdict_on(motion, system_of(case), "it broke")
+    (verdict,) = classify([given(motion, system_of(case), "it broke")])
     assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.UNDECIDED, Excitation.NONE, False)
     assert verdict.growth_rate is None
 

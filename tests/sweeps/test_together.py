@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 import tomli_w
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.runs.judge import verdict_on
+from brakecli.runs.judge import given
 from brakecli.runs.run import asked
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import certify
@@ -78,7 +79,8 @@ def test_what_a_sweep_leaves_out_of_a_verdict_changes_nothing_that_it_keeps(tmp_
         (found,) = certify_together([system])
         assert found is not None
         history = array_history(system.interval, found.motion.rows)
-        whole, brief = (verdict_on(history, system, None, in_full=full) for full in (True, False))
+        asked_of = [given(history, system, None)]
+        (whole,), (brief,) = (classify(asked_of, in_full=full) for full in (True, False))
         one, other = (values_of(kept, {"verdict": verdict}) for verdict in (whole, brief))
         assert one == other
         assert whole.reasons == brief.reasons
