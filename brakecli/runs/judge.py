@@ -1,4 +1,4 @@
-"""A case in memory: its motion, and the verdict on a motion, with what is asked of its case."""
+"""A case in memory: its motion, what is to be judged of it, and its verdict."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import context
-from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.measure import Continued, Given
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
@@ -20,23 +20,20 @@ from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Track
 
-DEFAULT = Thresholds()
+_DEFAULT = Thresholds()
 
 
-def verdict_on(
+def given(
     history: History,
     system: System,
     failure: str | None,
     exponent: Exponent | None = None,
     track: Track | None = None,
-    thresholds: Thresholds = DEFAULT,
-    *,
     theory: Theory | None = None,
-    in_full: bool = True,
-) -> Verdict:
-    """The verdict on a motion; where a row may need it, it is continued on the smooth wheel.
+) -> Given:
+    """What is known of a motion that is to be judged; `theory` is given where it is known already.
 
-    `theory` is given where it is known already.
+    Where a row of the verdict may need it, the motion is continued on the smooth wheel.
     """
 
     def continued() -> Continued:
@@ -46,16 +43,7 @@ def verdict_on(
         state = [float(history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return without_waves(system, np.array(state))
 
-    return classify(
-        history,
-        context(system, theory),
-        thresholds,
-        exponent=exponent,
-        track=track or UNTRACKED,
-        continued=continued,
-        failure=failure,
-        in_full=in_full,
-    )
+    return Given(history, context(system, theory), exponent, track or UNTRACKED, continued, failure or "")
 
 
 def asked(system: System) -> System:
@@ -79,19 +67,16 @@ def motion_of(
     return certified
 
 
-def verdict_in_memory(
-    motion: Motion,
-    system: System,
-    thresholds: Thresholds = DEFAULT,
-    *,
-    theory: Theory | None = None,
-    in_full: bool = True,
-) -> Verdict:
+def verdict_in_memory(motion: Motion, system: System, thresholds: Thresholds = _DEFAULT) -> Verdict:
     """The verdict on a motion whose samples are in memory."""
+    return classify([in_memory(motion, system)], thresholds)[0]
+
+
+def in_memory(motion: Motion, system: System, theory: Theory | None = None) -> Given:
+    """A motion to be judged whose samples are in memory; raises FloatingPointError where one overflows."""
     refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)
-    failure, known = motion.work.failure_sentence, (motion.exponent, motion.track)
-    return verdict_on(history, system, failure, *known, thresholds, theory=theory, in_full=in_full)
+    return given(history, system, motion.work.failure_sentence, motion.exponent, motion.track, theory)
 
 
 def judged_in_memory(system: System, progress: Progress) -> Judged[Motion]:

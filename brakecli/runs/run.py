@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from brakecli.about import __version__
 from brakecli.analysis.over_time import OverTime, over_time
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import peak, spectrum
 from brakecli.case.read import LoadedCase, with_duration
@@ -23,7 +24,7 @@ from brakecli.files.field import values_of
 from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.judge import asked, judged_in_memory, motion_of, refuse_overflow, verdict_on
+from brakecli.runs.judge import asked, given, judged_in_memory, motion_of, refuse_overflow
 from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.settled import settled
@@ -110,9 +111,8 @@ def run(
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            verdict = known or verdict_on(
-                history, system, motion.work.failure_sentence, motion.exponent, motion.track
-            )
+            seen = motion.work.failure_sentence, motion.exponent, motion.track
+            verdict = known or classify([given(history, system, *seen)])[0]
             top = _write_spectrum(result, history, verdict)
             changing = None if motion.work.failed else over_time(history, system)
             if changing:

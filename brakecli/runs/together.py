@@ -1,8 +1,8 @@
 """The promises of many cases at once, by runs that know their own error, side by side in lanes."""
 
 import math
-from collections import Counter, defaultdict
-from collections.abc import Generator, Hashable, Sequence
+from collections import Counter
+from collections.abc import Generator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +12,7 @@ from brakecli.runs.certificate import Certified, displacement
 from brakecli.runs.ladder import first_nodes
 from brakecli.runs.own_error import exact_is_cheaper, promised
 from brakecli.runs.tolerance import begins_with_steps
+from brakecli.solver.alike import at_once
 from brakecli.solver.ensemble import fits, run_together
 from brakecli.solver.lanes.records import LANES
 from brakecli.solver.motion import Motion
@@ -82,16 +83,15 @@ def certify_together(systems: Sequence[System]) -> list[Certified | None]:
 
     for i in runs:
         go_on(i, None)
+
+    def side_by_side(at: list[int]) -> list[Motion | None]:
+        return run_together([ready[i] for i in at])
+
     while rungs:
-        alike, ready = defaultdict[Hashable, list[int]](list), rungs
-        for i, rung in ready.items():
-            if (key := fits(rung)) is not None:
-                alike[key].append(i)
-        rungs = {}
-        for members in alike.values():
-            with np.errstate(all="ignore"):  # of a lane, which is left then
-                motions = run_together([ready[i] for i in members])
-            for i, motion in zip(members, motions, strict=True):
-                if motion is not None:
-                    go_on(i, motion)
+        places, ready, rungs = [*rungs], [*rungs.values()], {}
+        with np.errstate(all="ignore"):  # of a lane, which is left then
+            motions = at_once([*map(fits, ready)], side_by_side)
+        for i, motion in zip(places, motions, strict=True):
+            if motion is not None:
+                go_on(i, motion)
     return found

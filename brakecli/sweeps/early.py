@@ -13,7 +13,6 @@ stick, a settled part that is too short), there is no early verdict, and the run
 """
 
 import math
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -122,7 +121,7 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
     force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
     answers = Answers(duration=end, linear=True, growth=theory.mode.growth, ringing=theory.mode.frequency)
     if theory.direction > 0:
-        answers = replace(answers, to_limit=theory.seconds_to_limit(end, last))
+        answers = answers._replace(to_limit=theory.seconds_to_limit(end, last))
     decision = decide(answers, Thresholds())
     evidence = {"row": decision.row, "growth": theory.mode.growth}
     numbers, left = (0.0, 0.0, force, system.radius * force), math.exp(theory.mode.growth * (end - o.time))

@@ -12,16 +12,18 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from time import process_time
 
-from brakecli.runs.certificate import Certified
+from brakecli.analysis.stability.linear import Theory
 from brakecli.runs.cost import stability_seconds
 from brakecli.runs.limits import Check, within_range
 from brakecli.runs.price import measured
+from brakecli.runs.settled import Judged
 from brakecli.runs.together import TOGETHER, certify_together, loops
 from brakecli.solver.lanes.records import LANES
+from brakecli.solver.motion import Motion
 from brakecli.solver.system import MOST_STEPS
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed, judged
+from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed, judged, judged_together
 
 SECONDS = 1.0
 """Processor time (s) after which no further place is drawn. Other programs do not change it."""
@@ -129,11 +131,13 @@ class Pilot:
             certified = certify_together(systems)
         climbed = (process_time() - begin) / max(loops(systems), 1) * task_loops / max(len(others), 1)
         begin, alone = process_time(), list[Begun]()
-        for each, found in zip(ready, certified, strict=True):
+        with within_range():
+            known = judged_together(systems, certified)
+        for each, (found, theory) in zip(ready, known, strict=True):
             if found is None:
                 alone.append(each)
             else:
-                self._point(each, found)
+                self._point(each, found, theory)
         seconds = process_time() - begin
         if in_lanes:
             self.in_lanes, self.alone = self.in_lanes + len(ready), self.alone + len(alone)
@@ -186,7 +190,7 @@ class Pilot:
             self.begun |= price.at_least
             return price.seconds
         begin = process_time()
-        self._point(point, None)
+        self._point(point)
         return process_time() - begin
 
     def _guess(self, check: Check) -> float:
@@ -195,12 +199,12 @@ class Pilot:
         searched = stability_seconds(check.system) if searches else 0.0
         return searched + (0.0 if may_be_early(check.system) else check.seconds)
 
-    def _point(self, point: Begun, certified: Certified | None) -> None:
+    def _point(self, point: Begun, known: Judged[Motion] | None = None, theory: Theory | None = None) -> None:
         if self.with_searches:
-            computed(self.plan, point, certified)
+            computed(self.plan, point, known, theory)
             return
         with suppress(*FAULTS):
-            judged(point.case, point.check, certified, whole=False)
+            judged(point.case, point.check, known, theory, whole=False)
 
 
 def drawn(shape: Sequence[int]) -> Iterator[tuple[int, ...]]:

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory, theories_of
@@ -24,10 +25,11 @@ from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.files.valid import LARGEST
 from brakecli.runs.certificate import Certificate, Certified
-from brakecli.runs.judge import asked, motion_of, verdict_in_memory
+from brakecli.runs.judge import asked, in_memory, motion_of
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.settled import Judged, settled
 from brakecli.runs.together import TOGETHER, certify_together
+from brakecli.solver.alike import at_once
 from brakecli.solver.motion import Motion
 from brakecli.solver.roughness import TWO_PI, turned
 from brakecli.solver.schedules import integral_at
@@ -107,17 +109,18 @@ def checked(case: Case) -> Check:
 
 
 def judged(
-    case: Case, found: Check, certified: Certified | None, theory: Theory | None = None, *, whole: bool
+    case: Case, found: Check, known: Judged[Motion] | None, theory: Theory | None = None, *, whole: bool
 ) -> PointRun:
-    """The end of `simulate`, by a motion that is known already or by one that is computed."""
+    """The end of `simulate`, by a motion that is known already with its verdict, or by one that is computed."""
 
     def run(part: System) -> Judged[Motion | Ending]:
-        motion, certificate = certified if certified and part is found.system else (None, None)
-        if motion is None and not whole and (known := early(part, theory)) is not None:
+        if known and part is found.system:
             return known
-        if motion is None:
-            motion, certificate = motion_of(part)
-        return Judged(verdict_in_memory(motion, part, theory=theory, in_full=whole), motion, certificate)
+        if not whole and (ended := early(part, theory)) is not None:
+            return ended
+        motion, certificate = motion_of(part)
+        (verdict,) = classify([in_memory(motion, part, theory)], in_full=whole)
+        return Judged(verdict, motion, certificate)
 
     with within_range():
         ended = settled(found.system, run)
@@ -152,12 +155,33 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         ready = [each for each in points if isinstance(each, Begun)]
         systems = [each.check.system for each in ready]
         with within_range():
-            found = zip(certify_together(systems), theories_of(systems), strict=True)
+            found = judged_together(systems, certify_together(systems))
         known = dict(zip(map(id, ready), found, strict=True))
         for place, each in enumerate(points, start - first):
             record, _ = computed(plan, each, *known.get(id(each), ()))
             records[place] = record[0]
     return records
+
+
+def judged_together(
+    systems: Sequence[System], certified: Sequence[Certified | None]
+) -> list[tuple[Judged[Motion] | None, Theory]]:
+    """The motions that are certified, with their verdicts, and all theories; None where a point has to run alone.
+
+    No number of one depends on the others, and numbers that no brake has concern none of them.
+    """
+    theories = theories_of(systems)
+
+    def verdicts(places: list[int]) -> list[Judged[Motion] | None]:
+        known = [each for i in places if (each := certified[i])]
+        try:
+            given = zip(known, places, strict=True)
+            found = classify([in_memory(each.motion, systems[i], theories[i]) for each, i in given], in_full=False)
+        except (ArithmeticError, np.linalg.LinAlgError, BrakecliError):
+            return [None] if len(places) == 1 else [each for i in places for each in verdicts([i])]
+        return [Judged(verdict, *each) for verdict, each in zip(found, known, strict=True)]
+
+    return [*zip(at_once([each and True for each in certified], verdicts), theories, strict=True)]
 
 
 def _line(plan: Plan, unit: int) -> NDArray[Any]:
@@ -244,13 +268,13 @@ def begun(plan: Plan, settings: Settings) -> Begun | Exception:
 
 
 def computed(
-    plan: Plan, point: Begun | Exception, certified: Certified | None = None, theory: Theory | None = None
+    plan: Plan, point: Begun | Exception, known: Judged[Motion] | None = None, theory: Theory | None = None
 ) -> tuple[NDArray[Any], PointRun | None]:
     """The record of a point and its run, which is None where it was not possible."""
     try:
         if isinstance(point, Exception):
             raise point
-        outcome = judged(point.case, point.check, certified, theory, whole=False)
+        outcome = judged(point.case, point.check, known, theory, whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             from brakecli.sweeps.critical import search  # only searches wait for the kernels of branches

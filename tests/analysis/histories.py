@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.measure import Continued, Given
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
@@ -87,7 +87,8 @@ def track_of(history: History) -> Track:
 
 def classified(history: History, context: Context, thresholds: Thresholds | None = None, **asked: Any) -> Verdict:
     """The verdict on a history, with the track that its samples tell of."""
-    return classify(history, context, thresholds or Thresholds(), **{"track": track_of(history), **asked})
+    given = Given(history, context, **{"track": track_of(history), **asked})
+    return classify([given], thresholds or Thresholds())[0]
 
 
 def lasting(history: History, context: Context, thresholds: Thresholds | None = None, **asked: Any) -> Verdict:

@@ -99,7 +99,7 @@ FORCED = Regime.DAMPED, Excitation.FORCED
 
 
 def answers(**changes: Any) -> Answers:
-    return replace(MOVING, **changes)
+    return MOVING._replace(**changes)
 
 
 @pytest.mark.parametrize("row", SMOOTH_ROWS)
@@ -221,4 +221,4 @@ def test_a_row_whose_remedy_is_a_longer_run_says_so_to_runs_that_settle() -> Non
     assert named - asked == {"either", "nothing moves yet"}
     (rests,) = (row for row in rows if row.name == "nothing moves yet")
     grows = Answers(growth=10.0, duration=1.0)
-    assert [rests.decision(replace(grows, duration=each)).longer for each in (1.0, 1e3)] == [True, False]
+    assert [rests.decision(grows._replace(duration=each)).longer for each in (1.0, 1e3)] == [True, False]

@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 import tomli_w
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.table import Excitation, Regime
-from brakecli.analysis.stability.linear import linear_theory
+from brakecli.analysis.stability.linear import linear_theory, parts
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.runs.judge import verdict_on
+from brakecli.runs.judge import given
 from brakecli.solver.history import array_history
 from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
@@ -228,7 +229,7 @@ def test_the_amplitude_of_many_waves_is_that_of_their_highest_meeting(waves: int
     starts = np.arange(0.0, 64.0 * 4.0, step * (1 << 14))
     bounds = [(x.min(), x.max()) for x in (np.imag(np.exp(turns * start) @ block) for start in starts)]
     swing = 0.5 * (max(high for _, high in bounds) - min(low for low, _ in bounds))
-    assert theory.parts(np.zeros(2), np.array([0.0, 4.0]))[0] == pytest.approx(swing, rel=0.01)
+    assert parts([theory], np.zeros((1, 2)), np.array([0.0, 4.0]))[0] == pytest.approx(swing, rel=0.01)
 
 
 @pytest.mark.parametrize("duration", [0.003, 0.05, 1.0])
@@ -243,7 +244,7 @@ def test_a_forced_swing_is_one_within_its_time(duration: float) -> None:
     assert theory is not None
     time = np.linspace(0.0, 64.0 * duration, 400_000)
     x = np.imag(theory.waves[:, 0] @ np.exp(2j * np.pi * np.outer(theory.passing, time)))
-    swing = theory.parts(np.zeros(2), np.array([0.0, duration]))[0]
+    swing = parts([theory], np.zeros((1, 2)), np.array([0.0, duration]))[0]
     assert swing == pytest.approx(0.5 * np.ptp(x), rel=6e-3)
 
 
@@ -283,7 +284,7 @@ def test_a_stop_is_not_called_settled() -> None:
 def test_a_failed_run_is_neither_forced_nor_settled() -> None:
     case = make(DRUM, solver__duration=2.0)
     motion = array_history(1e-4, simulate(case).rows)
-    verdict = verdict_on(motion, system_of(case), "it broke")
+    (verdict,) = classify([given(motion, system_of(case), "it broke")])
     assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.UNDECIDED, Excitation.NONE, False)
     assert verdict.growth_rate is None
 

@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 import tomli_w
 
+from brakecli.analysis.regime.classify import classify
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.runs.judge import verdict_on
+from brakecli.runs.judge import asked, given
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import array_history
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.point import simulate
+from brakecli.sweeps.point import judged_together, simulate
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import counts
 from tests.examples import ROUGH, make
@@ -77,7 +78,8 @@ def test_what_a_sweep_leaves_out_of_a_verdict_changes_nothing_that_it_keeps(tmp_
         (found,) = certify_together([system])
         assert found is not None
         history = array_history(system.interval, found.motion.rows)
-        whole, brief = (verdict_on(history, system, None, in_full=full) for full in (True, False))
+        asked_of = [given(history, system, None)]
+        (whole,), (brief,) = (classify(asked_of, in_full=full) for full in (True, False))
         one, other = (values_of(kept, {"verdict": verdict}) for verdict in (whole, brief))
         assert one == other
         assert whole.reasons == brief.reasons
@@ -104,6 +106,18 @@ def test_numbers_that_no_brake_has_concern_no_other_point(tmp_path: Path) -> Non
     with h5py.File(tmp_path / "one.h5") as file:
         assert file["status"][[0, 3]].tolist() == [b"done", b"done"]
         assert b"crashed" not in file["status"][:].tolist()
+
+
+def test_a_motion_that_overflows_takes_no_verdict_from_the_others() -> None:
+    systems = [asked(system_of(make(PROMISED, friction__coefficient=each))) for each in (0.2, 0.3, 0.4)]
+    certified = certify_together(systems)
+    alone = [judged_together([system], [each])[0][0] for system, each in zip(systems, certified, strict=True)]
+    assert all(alone)
+    assert certified[1] is not None
+    certified[1].motion.rows[-1, 0] = np.inf
+    first, second, third = (known for known, _ in judged_together(systems, certified))
+    assert second is None
+    assert [*map(repr, (first, third))] == [*map(repr, alone[::2])]
 
 
 @pytest.mark.parametrize("shoes", counts(3, 60))

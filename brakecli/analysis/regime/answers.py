@@ -2,9 +2,8 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
 from enum import StrEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 
@@ -17,8 +16,7 @@ class Fate(StrEnum):
     UNKNOWN = "unknown"
 
 
-@dataclass(frozen=True)
-class Answers:
+class Answers(NamedTuple):
     """What is known of a motion, in SI units; nan where a number is not known."""
 
     failure: str = ""  # why the run has failed
@@ -76,8 +74,7 @@ class Answers:
 
     def known(self) -> dict[str, Any]:
         """What is known, by name: numbers, texts, and 1 for what holds."""
-        found = {each.name: getattr(self, each.name) for each in fields(self)}
-        kept = {name: value for name, value in found.items() if value != _UNKNOWN[name]}
+        kept = {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
         return {
             name: str(value) if isinstance(value, str) else float(value)
             for name, value in kept.items()
@@ -91,7 +88,8 @@ class Answers:
         A number may be a list of one, as xarray saves it.
         """
         single = {name: value[0] if isinstance(value, list) and value else value for name, value in known.items()}
-        return cls(**{name: type(value)(single[name]) for name, value in _UNKNOWN.items() if name in single})
+        known_as = cls._field_defaults.items()
+        return cls(**{name: type(value)(single[name]) for name, value in known_as if name in single})
 
     def powers(self, rate: float) -> float:
         """Powers of e by which something changes in half of the run."""
@@ -169,6 +167,3 @@ class Answers:
     def word(self) -> str:
         """Which way the level changes."""
         return "grows" if self.change > 0.0 else "falls"
-
-
-_UNKNOWN: dict[str, Any] = {each.name: each.default for each in fields(Answers)}

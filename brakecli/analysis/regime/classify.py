@@ -1,78 +1,72 @@
 """The verdict on a history: what the table decides, with the numbers of what lasts."""
 
 import math
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Sequence
 from typing import Any
 
+from brakecli.analysis.regime.answers import Answers
+from brakecli.analysis.regime.closed import Lasting
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.lasting import Lasting, lasting
-from brakecli.analysis.regime.measure import Continued, Shown, answers
-from brakecli.analysis.regime.table import Excitation, Regime, Thresholds, decide
+from brakecli.analysis.regime.lasting import lasting
+from brakecli.analysis.regime.measure import Given, Shown, answers
+from brakecli.analysis.regime.seen import seen
+from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds, decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import segment
-from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
-from brakecli.solver.tangent import Exponent
-from brakecli.solver.track import UNTRACKED, Track
 
 _DEFAULT = Thresholds()
 
 
-def classify(
-    history: History,
-    context: Context,
-    thresholds: Thresholds = _DEFAULT,
-    *,
-    exponent: Exponent | None = None,
-    track: Track = UNTRACKED,
-    continued: Callable[[], Continued] = Continued,
-    failure: str | None = None,
-    in_full: bool = True,
-) -> Verdict:
-    """The regime of a run's history by the table of docs/regimes.md.
+def classify(given: Sequence[Given], thresholds: Thresholds = _DEFAULT, *, in_full: bool = True) -> list[Verdict]:
+    """The regimes of histories by the table of docs/regimes.md; no number of one depends on the others.
 
-    `exponent` of its small disturbances, what the loop noted in its `track`, and what it comes to where it is
-    `continued` on the smooth wheel, are asked of the case. Where not `in_full`, evidence and numbers that a sweep
-    does not keep are left out; all others are the same.
+    Where not `in_full`, evidence and numbers that a sweep does not keep are left out; all others are the same.
     """
-    shown = Shown(history, context, thresholds, track)
-    found = answers(shown, exponent, continued, failure or "")
-    decision = decide(found, thresholds)
-    what = lasting(shown, found, decision, in_full=in_full)
-    part, radius, cycles = what.part, context.radius, what.cycles
+    looked = seen([each.history for each in given], thresholds.settled_within)
+    shown = [Shown(*each, thresholds) for each in zip(given, looked, strict=True)]
+    found = [answers(each) for each in shown]
+    decisions = [decide(each, thresholds) for each in found]
+    numbers = lasting(shown, found, decisions, in_full=in_full)
+    return [_verdict(*each, in_full=in_full) for each in zip(shown, found, decisions, numbers, strict=True)]
+
+
+def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *, in_full: bool) -> Verdict:
+    """The verdict on one history."""
+    part, radius, cycles, look = what.part, shown.context.radius, what.cycles, shown.seen
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
-        found = replace(found, frequency=what.frequency or math.nan)
+        found = found._replace(frequency=what.frequency or math.nan)
     evidence: dict[str, Any] = {"row": decision.row}
     if in_full:
-        evidence |= found.known() | what.evidence | _further(shown, what, context)
-    friction = part.mean("friction_force")
+        evidence |= found.known() | what.evidence | _further(shown, what, shown.context)
     theory = shown.linear if found.linear else None
     return Verdict(
         amplitude=what.amplitude,
-        amplitude_first=shown.tenths[0].amplitude("x") if decision.regime is Regime.DAMPED else None,
+        amplitude_first=look.first if decision.regime is Regime.DAMPED else None,
         amplitude_spread=what.spread,
         amplitude_forced=what.forced,
         amplitude_own=what.own,
         forced_frequency=what.forced_frequency,
-        left=shown.envelope.final / shown.envelope.largest if shown.envelope and found.moves else 0.0,
+        left=look.final_level / look.largest_level if not found.few_samples and found.moves else 0.0,
         growth_rate=found.own if theory and math.isfinite(found.own) else None,
         ringing_frequency=theory.mode.frequency if theory else None,
-        frequency_resolution=1.0 / (segment(part.stop - part.start) * history.interval),
+        frequency_resolution=1.0 / (segment(part.stop - part.start) * shown.interval),
         torque_variation=radius * what.variation if what.variation is not None else None,
-        settled_from=part.start * history.interval,
+        settled_from=part.start * shown.interval,
         start=part.start,
         longer=what.force_rings is not None or (what.longer and not what.settled),
         settled=what.settled and decision.regime is not Regime.UNDECIDED,
-        stick_fraction=cycles.stick_fraction if cycles else part.fraction(ContactState.STICK),
-        contact_loss_fraction=cycles.contact_loss_fraction if cycles else part.fraction(ContactState.SEPARATED),
-        mean_friction_force=friction,
-        braking_torque=radius * friction,
+        stick_fraction=cycles.stick_fraction if cycles else shown.fraction(ContactState.STICK, part),
+        contact_loss_fraction=cycles.contact_loss_fraction
+        if cycles
+        else shown.fraction(ContactState.SEPARATED, part),
+        mean_friction_force=what.mean_force,
+        braking_torque=radius * what.mean_force,
         decision=decision,
         notes={about: note for about, note in what.notes.items() if note},
         evidence=evidence,
-        thresholds=thresholds,
+        thresholds=shown.limits,
     )
 
 

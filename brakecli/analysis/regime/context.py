@@ -2,8 +2,9 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
+from typing import NamedTuple
 
 import numpy as np
 
@@ -19,8 +20,7 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
 
-@dataclass(frozen=True)
-class Context:
+class Context(NamedTuple):
     """What is known of the case behind a history."""
 
     belt_speed: float  # U, m/s

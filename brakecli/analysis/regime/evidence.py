@@ -1,10 +1,9 @@
 """What verdicts go by: envelope, stick, lines and powers of a history."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
-from itertools import pairwise
+from functools import cached_property, lru_cache, reduce
 from typing import Any
 
 import numpy as np
@@ -17,14 +16,13 @@ from brakecli.solver.quantities import ContactState
 
 FEWEST_SAMPLES = 160  # of a history that has an envelope
 WINDOWS = 40
-_LAST = slice(-10, None)  # windows that give the final values
 LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
 LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
 _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
 _MOST_PLACES = 1 << 16  # samples at which a forced motion is computed
 _BATCHES = 10
-_FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
+FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
 _MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told from what lies beside them
 _LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
 
@@ -36,7 +34,10 @@ def tenths(samples: int) -> tuple[int, int]:
 
 @dataclass(frozen=True)
 class Part:
-    """The samples start … stop - 1 of a history, read in pieces that fit into memory."""
+    """The samples start … stop - 1 of a history, read in pieces that fit into memory.
+
+    Of many histories at once, most of its numbers are arrays with one for each.
+    """
 
     history: History
     start: int
@@ -52,44 +53,49 @@ class Part:
         values = self.history.read(name, max(self.start, self.stop - LONGEST), self.stop)
         return np.asarray(values - values.mean())
 
-    def mean(self, name: str) -> float:
+    def mean(self, name: str) -> Any:
         """Mean of a variable."""
-        return sum(float(np.sum(piece)) for piece in self.pieces(name)) / (self.stop - self.start)
+        return sum(np.sum(piece, axis=-1) for piece in self.pieces(name)) / (self.stop - self.start)
 
     def fraction(self, state: ContactState) -> float:
-        """Part of the samples in a state of the contact."""
+        """Part of the samples of one history in a state of the contact."""
         number = int(state)  # which NumPy compares in half the time
         return sum(np.count_nonzero(piece == number) for piece in self.pieces("state")) / (self.stop - self.start)
 
-    def always(self, state: ContactState) -> bool:
-        """Whether all samples are in a state of the contact; mostly the first one shows that they are not."""
-        number = int(state)
-        return all(piece[0] == number and bool((piece == number).all()) for piece in self.pieces("state"))
+    def since(self, name: str, holds: Callable[[Array], NDArray[np.bool_]]) -> Any:
+        """The sample from which on something holds of a variable; `stop` where it does not hold at the end."""
+        found: Any = self.start
+        for begin, piece in zip(range(self.start, self.stop, LONGEST), self.pieces(name), strict=True):
+            broken = ~holds(piece)[..., ::-1]
+            last = begin + broken.shape[-1] - broken.argmax(axis=-1)
+            found = np.where(broken.any(axis=-1), last, found)
+        return found
 
-    def extremes(self, name: str) -> tuple[float, float]:
+    def extremes(self, name: str) -> tuple[Any, Any]:
         """Least and largest value of a variable."""
-        bounds = [(np.minimum.reduce(piece), np.maximum.reduce(piece)) for piece in self.pieces(name)]
-        return float(min(bounds)[0]), float(max(largest for _, largest in bounds))
+        bounds = [
+            (np.minimum.reduce(each, axis=-1), np.maximum.reduce(each, axis=-1)) for each in self.pieces(name)
+        ]
+        least, largest = zip(*bounds, strict=True)
+        return reduce(np.minimum, least), reduce(np.maximum, largest)
 
-    def amplitude(self, name: str) -> float:
+    def amplitude(self, name: str) -> Any:
         """Half of peak to peak of a variable."""
         least, largest = self.extremes(name)
         return 0.5 * (largest - least)
 
-    def deviation(self, name: str) -> float:
+    def deviation(self, name: str) -> Any:
         """Standard deviation of a variable, from sums that begin at its first value."""
-        first, total, square = float(self.history.read(name, self.start, self.start + 1)[0]), 0.0, 0.0
+        first, total, square = self.history.read(name, self.start, self.start + 1), 0.0, 0.0
         for piece in self.pieces(name):
             values = piece - first
-            total, square = total + float(values.sum()), square + float(np.square(values).sum())  # no threads
+            total, square = total + values.sum(axis=-1), square + np.square(values).sum(axis=-1)  # no threads
         count = self.stop - self.start
-        return float(np.sqrt(max(square / count - (total / count) ** 2, 0.0)))
+        return np.sqrt(np.maximum(square / count - (total / count) ** 2, 0.0))
 
-    def slides(self, slip: ContactState | None) -> bool:
-        """Whether the whole pad touches and the shoe slips to this side (None: to any) at all of the samples."""
-        if slip is not None and not self.always(slip):
-            return False
-        return self.extremes("contact_fraction")[0] >= _FULL
+    def touches(self) -> bool:
+        """Whether the whole pad touches at all of the samples of one history."""
+        return bool(self.extremes("contact_fraction")[0] >= FULL)
 
     def places(self, name: str = "x") -> tuple[Array, Array]:
         """Evenly spaced samples of a variable, not too many, and their times (s)."""
@@ -97,10 +103,10 @@ class Part:
         picked, first = [], self.start
         for begin in range(self.start, self.stop, LONGEST):
             values = self.history.read(name, begin, min(begin + LONGEST, self.stop))
-            picked.append(values[first - begin :: stride])
-            first += stride * len(picked[-1])
-        x = np.concatenate(picked)
-        return x, np.asarray(self.history.interval * (self.start + stride * np.arange(len(x))), np.float64)
+            picked.append(values[..., first - begin :: stride])
+            first += stride * picked[-1].shape[-1]
+        x = np.concatenate(picked, axis=-1)
+        return x, np.asarray(self.history.interval * (self.start + stride * np.arange(x.shape[-1])), np.float64)
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array, float]:
@@ -203,12 +209,12 @@ def _evenly(count: int) -> tuple[Array, float]:
     return away, float(away @ away)
 
 
-def trend(values: Array) -> tuple[float, float]:
+def trend(values: Array) -> tuple[Any, Any]:
     """Change of evenly spaced values over their record, by a line of least squares, and its standard error."""
-    (away, squares), rest = _evenly(len(values)), values - values.mean()
-    slope = float(away @ rest / squares)
-    rest = rest - slope * away
-    return slope, math.sqrt(float(rest @ rest / squares) / (len(values) - 2))
+    (away, squares), rest = _evenly(values.shape[-1]), values - values.mean(axis=-1, keepdims=True)
+    slope = np.vecdot(away, rest) / squares
+    rest = rest - slope[..., None] * away
+    return slope, np.sqrt(np.vecdot(rest, rest) / squares / (values.shape[-1] - 2))
 
 
 def windowed(values: Array) -> Array:
@@ -219,54 +225,13 @@ def windowed(values: Array) -> Array:
     return np.array([window @ values[i : i + size] for i in starts])
 
 
-def level_change(levels: Array) -> tuple[float, float]:
+def level_change(levels: Array) -> tuple[Any, Any]:
     """Change of the logarithm of a level over its record, with its standard error; nan where there is none.
 
     The error is that of the means of ten batches, or of three levels or more where there are fewer.
     """
-    batches = min(_BATCHES, len(levels))
-    means = levels[len(levels) % batches :].reshape(batches, -1).mean(axis=1)
-    if not means.min() > 0.0:
-        return math.nan, math.nan
-    return trend(np.log(means))
-
-
-def _final(values: Array) -> float:
-    """Mean of the last windows."""
-    return float(np.add.reduce(values[_LAST])) / 10.0
-
-
-@lru_cache(maxsize=4)
-def _windows(samples: int) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.int_]]:
-    """The samples that begin equal windows, how many each holds, and where the window of each sample begins."""
-    edges = np.linspace(0, samples, WINDOWS + 1).astype(int)
-    return edges[:-1], np.diff(edges), np.repeat(edges[:-1], np.diff(edges))
-
-
-class Envelope:
-    """Standard deviations of vx (m/s) in equal windows, the last ones in the mean and the largest."""
-
-    def __init__(self, history: History) -> None:
-        """Take a history of at least `FEWEST_SAMPLES`."""
-        if history.samples > LONGEST:
-            edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
-            windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
-            self.vx, *self._x = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows]).T
-        else:
-            x, vx = (history.read(name, 0, history.samples) for name in ("x", "vx"))
-            starts, counts, firsts = _windows(history.samples)
-            self._x = [each.reduceat(x, starts) for each in (np.minimum, np.maximum)]
-            away = vx - vx[firsts]
-            mean, square = (np.add.reduceat(each, starts) / counts for each in (away, away * away))
-            self.vx = np.sqrt(np.maximum(square - mean**2, 0.0))
-        self.final, self.largest = _final(self.vx), float(self.vx.max())
-
-    def settled_window(self, within: float, reach: float) -> int | None:
-        """The window, never the first, from which on all are settled; None if fewer than ten are."""
-        settled = np.abs(self.vx - self.final) <= within * self.final
-        least, largest = self._x
-        span = _final(largest - least)
-        for bound in self._x:
-            settled &= np.abs(bound - _final(bound)) <= reach * span
-        first = WINDOWS - int(np.argmin(settled[::-1])) if not settled.all() else 1
-        return first if first <= WINDOWS - 10 else None
+    count = levels.shape[-1]
+    batches = min(_BATCHES, count)
+    means = levels[..., count % batches :].reshape(*levels.shape[:-1], batches, -1).mean(axis=-1)
+    positive = means.min(axis=-1, keepdims=True) > 0.0
+    return trend(np.log(np.where(positive, means, math.nan)))

@@ -2,24 +2,22 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 
 from brakecli.analysis.regime.answers import Answers
+from brakecli.analysis.regime.closed import RELAXED, Lasting, forced_linear
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
-from brakecli.analysis.regime.evidence import WINDOWS, Part, trend
+from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
-from brakecli.analysis.spectrum import Array
-from brakecli.analysis.stability.linear import Linear
+from brakecli.analysis.stability.linear import parts
+from brakecli.solver.alike import at_once
+from brakecli.solver.history import History, stacked
 
 _LIKELY = 16  # waves, of which one moves x most
-_RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
-_REST = 0.3  # of a forced motion, by which its closed form may be off
-_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _FEWEST_PIECES, _PIECES = 4, 16  # of a settled part, in which the friction force is compared
 _WIDER = 1.02  # times as far as in the last half of them, a transient swings
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
@@ -33,42 +31,42 @@ QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes befo
 _VAGUE = "the amplitude may be off by as much as itself: run longer, or take a smaller solver.step"
 
 
-@dataclass
-class Lasting:
-    """The numbers of the settled part, in SI units; None where one is not known."""
+def lasting(
+    shown: Sequence[Shown], answers: Sequence[Answers], decisions: Sequence[Decision], *, in_full: bool
+) -> list[Lasting]:
+    """The numbers of motions that have been decided on."""
+    linear = [
+        (each.samples, each.interval, each.linear.belt, each.linear.passing.tobytes())
+        if decision.excitation is Excitation.FORCED and each.linear
+        else None
+        for each, decision in zip(shown, decisions, strict=True)
+    ]
+    closed = at_once(linear, lambda at: forced_linear([shown[i] for i in at], [answers[i].decay for i in at]))
+    found = [_lasting(*each, in_full=in_full) for each in zip(shown, answers, decisions, closed, strict=True)]
+    forces = at_once(
+        [(each.part.stop, each.part.start, each.force_from) for each in found],
+        lambda at: _forces([shown[i].history for i in at], found[at[0]]),
+    )
+    for each, what, decision, force in zip(shown, found, decisions, forces, strict=True):
+        _add_force(each, what, *force, lasts=decision.regime is not Regime.UNDECIDED)
+    return found
 
-    part: Part
-    settled: bool
-    amplitude: float
-    spread: float | None = None
-    forced: float | None = None  # half of peak to peak of x that the roughness forces
-    own: float | None = None  # and that the shoe adds
-    forced_frequency: float | None = None  # of the wave that moves x most
-    variation: float | None = None  # of the friction force, peak to peak
-    frequency: float | None = None  # of cycles
-    cycles: Cycles | None = None  # of a vibration that lasts by itself
-    force_from: int = 0  # the sample from which on the force has settled: y may ring longer than x
-    force_rings: float | None = None  # for how long it still rings beside a settled x
-    longer: bool = True  # whether a longer run may settle what has not
-    notes: dict[str, str | None] = field(default_factory=dict)
-    evidence: dict[str, Any] = field(default_factory=dict)
 
-
-def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool) -> Lasting:
-    """The numbers of a motion that has been decided on."""
+def _lasting(
+    shown: Shown, answers: Answers, decision: Decision, closed: Lasting | None, *, in_full: bool
+) -> Lasting:
+    """The numbers of a motion, but those of its forces; `closed` where they have a closed form."""
     forced = decision.excitation is Excitation.FORCED
     lines: Sequence[float] = shown.context.forced if forced else ()
     if forced:
-        closed = _forced_linear(shown, shown.linear, answers.decay) if shown.linear else None
         found = closed or _forced(shown, answers)
     elif decision.excitation is Excitation.SELF_EXCITED and shown.cycles:
         found = _self_excited(shown, answers, shown.cycles)
     else:
-        part = shown.half if answers.linear else shown.judged
+        part = shown.part(shown.half) if answers.linear else shown.judged
         stays = not answers.moves or answers.carried  # all else dies, or is not known
-        left = shown.tenths[1] if decision.regime is Regime.DAMPED else part
-        found = Lasting(part, answers.settled and stays, left.amplitude("x"))
-        return _with_force(shown, found, lasts=decision.regime is not Regime.UNDECIDED)
+        damped = decision.regime is Regime.DAMPED
+        return Lasting(part, answers.settled and stays, shown.seen.final if damped else part.amplitude("x"))
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude
     if found.cycles and shown.context.forced and _holds_two(shown, found.part):
@@ -80,7 +78,7 @@ def lasting(shown: Shown, answers: Answers, decision: Decision, *, in_full: bool
     if found.spread is not None and 0.0 < found.amplitude <= found.spread:  # then not even its order is known
         found.notes["settled"] = found.notes.get("settled") or (_VAGUE if found.settled else None)
         found.spread, found.settled = None, False
-    return _with_force(shown, found, lasts=True)
+    return found
 
 
 def _wave(shown: Shown, part: Part) -> float | None:
@@ -100,74 +98,17 @@ def _holds_two(shown: Shown, part: Part) -> bool:
     return (part.stop - part.start) * shown.history.interval * slow >= 2.0
 
 
-def _forced_linear(shown: Shown, theory: Linear, decay: float) -> Lasting | None:
-    """The forced motion in closed form, with the settled part in which what the shoe adds has died away.
-
-    None where the waves force more than the closed form has.
-    """
-    whole, samples, interval = shown.whole, shown.history.samples, shown.history.interval
-    forced, lasting, own, time = theory.parts(*whole.places())
-    first, level, end, stays = _gone(shown, decay, own, forced)
-    if stays and end >= _REST * forced:
-        return None
-    found = Lasting(shown.judged, False, forced, None, forced)
-    begin, slow = first * samples // WINDOWS, shown.slowest(0.0)
-    if first <= WINDOWS - 10 and shown.duration - begin * interval >= 2.0 * slow:
-        found.part, found.settled = replace(whole, start=begin), True
-        force, rings = theory.force_parts(*whole.places("y"))
-        first, level, end, _ = _gone(shown, decay, rings, force)
-        if first <= WINDOWS - 10:
-            found.force_from = first * samples // WINDOWS
-        elif theory.slip is not None:
-            found.force_rings = _wait(decay, end, level)
-    else:
-        late = shown.duration + _wait(decay, end, level)
-        needed = max(_LONGER * late, 1.05 * (late + 2.0 * slow))
-        found.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
-    seconds = samples * interval - max(min(shown.last.start * interval, shown.duration - slow), 0.0)
-    if theory.opens and (beat := shown.beat()) > seconds:
-        found.notes["beat"] = f"the waves beat every {beat:.3g} s, which may open the pad again"
-    found.own = 0.5 * float(np.ptp(own[time >= found.part.start * interval]))
-    if found.settled:
-        found.spread = found.own + forced - 0.5 * float(np.ptp(lasting))
-    return found
-
-
-def _wait(decay: float, end: float, level: float) -> float:
-    """Time (s) until what is left, which decays at this rate (1/s), has come to a level."""
-    return math.log(max(end / max(level, 1e-300), 1.0)) / decay
-
-
-def _gone(shown: Shown, decay: float, own: Array, forced: float) -> tuple[int, float, float, bool]:
-    """The window from which on what the shoe adds has gone beside what is forced, and to which level.
-
-    Also what is left in the last quarter, and whether it stays: then it is forced, and missing in the closed form.
-    """
-    starts = -(-len(own) * np.arange(WINDOWS) // WINDOWS)
-    high, low = np.maximum.reduceat(own, starts), np.minimum.reduceat(own, starts)
-    left = 0.5 * (high - low)
-    end = 0.5 * float(high[-10:].max() - low[-10:].min())  # a window may be shorter than a period
-    change = trend(np.log(np.maximum(left[WINDOWS // 2 :], 1e-300)))[0]
-    lost = 0.5 * decay * shown.duration
-    stays = 0.5 * lost > _RELAXED and change > -0.25 * lost
-    level = shown.limits.settled_within * forced
-    if end < _REST * forced and stays:
-        level = max(level, 1.2 * end)
-    late = np.flatnonzero(left > level)
-    return int(late[-1]) + 1 if len(late) else 1, level, end, stays
-
-
 def _forced(shown: Shown, answers: Answers) -> Lasting:
     """A forced motion of a pad that opens: its cycle is the slowest wave, or the slowest beat."""
     part, interval, history = shown.judged, shown.history.interval, shown.history
     rate = -answers.exponent if math.isfinite(answers.exponent) else -shown.context.growth()
-    fading = 0.25 * shown.duration * rate < _RELAXED  # too slowly to be seen within a quarter of the run
+    fading = 0.25 * shown.duration * rate < RELAXED  # too slowly to be seen within a quarter of the run
     chaos = math.isfinite(answers.exponent) and answers.exponent > 0.0
-    found = Lasting(part, shown.settled is not None, 0.0)
+    found = Lasting(part, answers.settled, 0.0)
     if not found.settled and not fading:
         found.settled = shown.changes() <= shown.limits.settled_within
     seconds = (part.stop - part.start) * interval
-    if not chaos and (not found.settled or seconds * rate < _RELAXED):
+    if not chaos and (not found.settled or seconds * rate < RELAXED):
         found.settled = False
         needed = QUARTER * (shown.duration + 3.0 / max(rate, 1e-300))
         text = f"what the shoe adds dies away at only {rate:.3g} 1/s"
@@ -191,8 +132,9 @@ def _beating(shown: Shown, part: Part) -> float:
     """Amplitude of a longer motion over that of the settled part, as waves beat that force a linear one."""
     if not (theory := shown.context.linear()):
         return 1.0
-    forced, lasting, *_ = theory.parts(*(each[::_SPARSE] for each in part.places()))
-    return 2.0 * forced / max(float(np.ptp(lasting)), 1e-300)
+    x, time = part.places()
+    (forced,), (lasting,), _ = parts([theory], x[None, ::_SPARSE], time[::_SPARSE])
+    return 2.0 * float(forced) / max(float(np.ptp(lasting)), 1e-300)
 
 
 def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
@@ -223,7 +165,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     if math.isfinite(answers.rate_without_waves):
         rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
     shift = cycles.kick * cycles.frequency / rate if rate > 0.0 else 0.0
-    lasts = answers.settled and rate * seconds >= _RELAXED
+    lasts = answers.settled and rate * seconds >= RELAXED
     found = Lasting(part, lasts, cycles.amplitude, cycles=cycles)
     found.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
     changed = max(_surely(cycles.drift, shown.limits), _surely(cycles.detuning, shown.limits))
@@ -286,7 +228,8 @@ def _surely(change: tuple[float, float], limits: Thresholds) -> float:
 def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
     """What nodes and steps change in a motion forced on lines (Hz), or in one that lasts by itself."""
     context, part = shown.context, found.part
-    ripple = context.ripple(part, lines) if not found.cycles else None
+    opens = shown.seen.full_from > part.start  # otherwise it has none
+    ripple = context.ripple(part, lines) if opens and not found.cycles else None
     if found.spread is not None and lines and not (shown.linear and found.forced == found.amplitude):
         found.spread += found.amplitude * context.detuned(part, lines) + (ripple.size if ripple else 0.0)
     if ripple and ripple.counts:
@@ -295,12 +238,18 @@ def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
         found.notes["ripple"], found.settled = ripple.sentence, False
 
 
-def _with_force(shown: Shown, found: Lasting, *, lasts: bool) -> Lasting:
-    """The same with the variation of the friction force, and why it is missing or may be too small."""
-    part, interval, pattern = found.part, shown.history.interval, shown.context.pattern
-    late = replace(part, start=max(part.start, found.force_from))
-    low, high = late.extremes("friction_force")
-    found.variation = high - low
+def _forces(histories: Sequence[History], alike: Lasting) -> list[tuple[float, float]]:
+    """Mean and variation (N, peak to peak) of the friction force in the settled part, which all have in common."""
+    part = replace(alike.part, history=stacked(histories))
+    low, high = replace(part, start=max(part.start, alike.force_from)).extremes("friction_force")
+    return [*zip(part.mean("friction_force").tolist(), (high - low).tolist(), strict=True)]
+
+
+def _add_force(shown: Shown, found: Lasting, mean: float, variation: float, *, lasts: bool) -> None:
+    """Add mean and variation of the friction force, and why it is missing or may be too small."""
+    interval, pattern = shown.interval, shown.context.pattern
+    seconds = (shown.samples - max(found.part.start, found.force_from)) * interval
+    found.mean_force, found.variation = mean, variation
     if found.cycles:
         found.variation = found.cycles.force_variation
         if found.variation is None:
@@ -312,8 +261,7 @@ def _with_force(shown: Shown, found: Lasting, *, lasts: bool) -> Lasting:
         longer = QUARTER * (shown.duration + found.force_rings)
         text = f"the friction force still rings, and torque_variation is missing: run at least {longer:.3g} s"
         found.notes["torque_variation"] = text
-    elif lasts and shown.context.steady and (late.stop - late.start) * interval < 0.999 * pattern:
+    elif lasts and shown.context.steady and seconds < 0.999 * pattern:
         found.notes["torque_variation"] = (
             f"torque_variation needs {pattern:.3g} s, until the waves repeat: run longer"
         )
-    return found

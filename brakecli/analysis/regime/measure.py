@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
@@ -11,22 +10,14 @@ import numpy as np
 from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
-from brakecli.analysis.regime.evidence import (
-    FEWEST_SAMPLES,
-    LONGEST,
-    WINDOWS,
-    Envelope,
-    Part,
-    level_change,
-    tenths,
-    windowed,
-)
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, WINDOWS, Part, windowed
+from brakecli.analysis.regime.seen import Seen
 from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
-from brakecli.solver.track import Events, Track
+from brakecli.solver.track import UNTRACKED, Events, Track
 
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
 
@@ -42,35 +33,45 @@ class Continued(NamedTuple):
     sticks: float = math.nan  # in a period
 
 
+class Given(NamedTuple):
+    """A motion that is to be judged, with what is known of it."""
+
+    history: History
+    context: Context  # what its case says
+    exponent: Exponent | None = None  # of its small disturbances
+    track: Track = UNTRACKED  # what the loop has noted
+    continued: Callable[[], Continued] = Continued  # what it comes to on the smooth wheel
+    failure: str = ""  # why the run has failed
+
+
 class Shown:
     """What a history shows."""
 
-    def __init__(self, history: History, context: Context, limits: Thresholds, track: Track) -> None:
-        """Take a history, what is known of its case, and what the loop has noted."""
-        self.history, self.context, self.limits, self.track = history, context, limits, track
-        self.duration = history.samples * history.interval
-        self.whole = Part(history, 0, history.samples)
-        self.half = Part(history, history.samples // 2, history.samples)
-        self.last = Part(history, history.samples * (WINDOWS - 10) // WINDOWS, history.samples)
-        first, last = tenths(history.samples)
-        self.tenths = Part(history, 0, first), Part(history, last, history.samples)
+    def __init__(self, given: Given, seen: Seen, limits: Thresholds) -> None:
+        """Take a motion, and what all its samples show."""
+        self.history, self.context, *_ = self.given = given
+        self.seen, self.limits, self.track = seen, limits, given.track
+        self.samples, self.interval = self.history.samples, self.history.interval
+        self.duration = self.samples * self.interval
+        self.half, self.quarter = self.samples // 2, self.samples * (WINDOWS - 10) // WINDOWS
+        self.judged_from = seen.settled_from or self.half
+
+    def part(self, start: int) -> Part:
+        """The samples from one on."""
+        return Part(self.history, start, self.samples)
 
     @cached_property
-    def envelope(self) -> Envelope | None:
-        """The level of vx over time; None where samples are too few."""
-        return Envelope(self.history) if self.history.samples >= FEWEST_SAMPLES else None
-
-    @cached_property
-    def settled(self) -> Part | None:
-        """The settled part, if there is one."""
-        within = self.limits.settled_within
-        first = self.envelope.settled_window(within, 0.4 * within) if self.envelope else None
-        return None if first is None else replace(self.whole, start=first * self.history.samples // WINDOWS)
-
-    @property
     def judged(self) -> Part:
         """The settled part, or the second half."""
-        return self.settled or self.half
+        return self.part(self.judged_from)
+
+    def stays(self, state: ContactState, start: int) -> bool:
+        """Whether the contact is in a state from a sample on."""
+        return self.seen.state == state and self.seen.state_from <= start
+
+    def fraction(self, state: ContactState, part: Part) -> float:
+        """Part of the samples in a state of the contact, which mostly does not change any more."""
+        return float(self.seen.state == state) if self.seen.state_from <= part.start else part.fraction(state)
 
     @cached_property
     def linear(self) -> Linear | None:
@@ -78,16 +79,16 @@ class Shown:
         theory, slow = self.context.linear(), self.slowest(0.0)
         if theory is None:
             return None
-        start = max(min(self.last.start, self.history.samples - int(slow / self.history.interval)), 0)
-        slides = replace(self.last, start=start).slides(theory.slip) or theory.stays(self.end[1])
-        return theory if slides else None
+        start = max(min(self.quarter, self.samples - int(slow / self.interval)), 0)
+        slides = self.seen.full_from <= start and (theory.slip is None or self.stays(theory.slip, start))
+        return theory if slides or theory.stays(self.end[1]) else None
 
     @property
     def end(self) -> tuple[float, np.ndarray]:
         """Time and state of the last sample."""
-        last = self.history.samples - 1
-        state = [float(self.history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
-        return last * self.history.interval, np.array(state)
+        last = self.samples - 1
+        state = [float(self.history.read(name, last, self.samples)[0]) for name in ("x", "y", "vx", "vy")]
+        return last * self.interval, np.array(state)
 
     @cached_property
     def cycles(self) -> Cycles | None:
@@ -97,8 +98,7 @@ class Shown:
     @cached_property
     def events(self) -> Events:
         """The events of the part that is judged, as far as the loop keeps them and spectra are taken."""
-        first = max(self.judged.start, self.history.samples - LONGEST)
-        return self.track.events(first * self.history.interval)
+        return self.track.events(max(self.judged_from, self.samples - LONGEST) * self.interval)
 
     def slowest(self, amplitude: float) -> float:
         """Period (s) of the slowest wave that counts beside an amplitude of x (m) and beside the others; or 0."""
@@ -115,14 +115,13 @@ class Shown:
 
     def changes(self) -> float:
         """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
-        before = replace(self.half, stop=3 * self.history.samples // 4)
-        sizes = [np.array([each.deviation("vx"), each.amplitude("x")]) for each in (before, self.last)]
-        return float(np.abs(sizes[0] / np.maximum(sizes[1], 1e-300) - 1.0).max())
+        before = Part(self.history, self.half, 3 * self.samples // 4)
+        sizes = np.array([before.deviation("vx"), before.amplitude("x")])
+        return float(np.abs(sizes / np.maximum([self.seen.level, self.seen.amplitude], 1e-300) - 1.0).max())
 
     def powers(self) -> dict[str, float]:
         """Powers (W) that friction and the roughness give, with their errors, by the loop's account."""
-        begin = self.judged.start * self.history.interval
-        given, open_by = self.track.given(begin, self.judged.mean("friction_force"))
+        given, open_by = self.track.given(self.judged_from * self.interval, self.judged.mean("friction_force"))
         means = windowed(given)
         (friction, roughness), (off, off_too) = means.mean(axis=0).tolist(), (means.std(axis=0) / 2.0).tolist()
         found = {"power_of_friction": friction, "power_of_roughness": roughness}
@@ -138,19 +137,16 @@ def _beat(counts: tuple[float, ...]) -> float:
     return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
 
 
-def answers(
-    shown: Shown, exponent: Exponent | None, continued: Callable[[], Continued], failure: str = ""
-) -> Answers:
-    """The record of answers; `continued` is asked only where a row may need it."""
-    context, history, half, last = shown.context, shown.history, shown.half, shown.last
+def answers(shown: Shown) -> Answers:
+    """The record of answers; what the motion comes to is asked only where a row may need it."""
+    context, seen, (exponent, failure) = shown.context, shown.seen, (shown.given.exponent, shown.given.failure)
     stands, waves = context.belt_speed == 0.0, bool(context.forced)
-    away = ContactState.SEPARATED
-    lost = half.always(away)
+    few = shown.samples < FEWEST_SAMPLES
     found: dict[str, Any] = {
-        "failure": failure or "",
+        "failure": failure,
         "duration": shown.duration,
-        "samples": history.samples,
-        "few_samples": shown.envelope is None,
+        "samples": shown.samples,
+        "few_samples": few,
         "steady": context.steady,
         "stands": stands,
         "waves": waves,
@@ -158,25 +154,24 @@ def answers(
         "undamped": context.undamped,
         "locks": math.nan if context.locks is None else context.locks,
         "held": context.held,
-        "never": lost and shown.whole.always(away),
-        "lost": lost,
-        "left": last.always(away),
-        "carried": (last if stands else half).always(ContactState.STICK),
+        "never": shown.stays(ContactState.SEPARATED, 0),
+        "lost": shown.stays(ContactState.SEPARATED, shown.half),
+        "left": shown.stays(ContactState.SEPARATED, shown.quarter),
+        "carried": shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
     }
     if exponent is not None:
         found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))
-    if shown.envelope is None or not context.steady or failure:
+    if few or not context.steady or failure:
         return Answers(**found)
-    change, change_error = level_change(shown.envelope.vx[WINDOWS // 2 :])
     found |= {
-        "moves": shown.envelope.largest > context.quiet,
-        "slowest": shown.slowest(half.amplitude("x")),
-        "change": change,
-        "change_error": change_error,
-        "amplitude": last.amplitude("x"),
-        "level": last.deviation("vx"),
-        "settled": shown.settled is not None,
-        "seconds": (history.samples - shown.judged.start) * history.interval,
+        "moves": seen.largest_level > context.quiet,
+        "slowest": shown.slowest(seen.swing),
+        "change": seen.change,
+        "change_error": seen.change_error,
+        "amplitude": seen.amplitude,
+        "level": seen.level,
+        "settled": seen.settled_from > 0,
+        "seconds": (shown.samples - shown.judged_from) * shown.interval,
     }
     if (theory := shown.linear) is not None:
         found |= {"linear": True, "ringing": theory.mode.frequency}
@@ -184,10 +179,16 @@ def answers(
             found |= {"growth": theory.mode.growth, "growth_error": theory.known_to}
         if theory.direction > 0:
             found |= {"to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
-        return Answers(**found)
-    found["growth"] = context.growth()
+    else:
+        found |= _of_more(shown, waves)
+    return Answers(**found)
+
+
+def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
+    """What has to be known of a motion that is not linear."""
+    context, found = shown.context, dict[str, Any](growth=shown.context.growth())
     if not context.frictionless:
-        alone = continued()
+        alone = shown.given.continued()
         names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))
         found |= dict(zip(names, alone, strict=True))
     if waves:
@@ -199,4 +200,4 @@ def answers(
             found["band_share"] = shown.judged.narrow()
         if context.step:
             found["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
-    return Answers(**found)
+    return found

@@ -58,7 +58,7 @@ def ripple(
     samples = min(part.stop - part.start, _MOST_SAMPLES)
     end = Part(part.history, part.stop - samples, part.stop)
     work = samples * _FINER * system.nodes * len(system.wheel.g)
-    if samples < _FEWEST or not 0 < work <= _MOST_WORK or system.method.step is None or end.slides(None):
+    if samples < _FEWEST or not 0 < work <= _MOST_WORK or system.method.step is None or end.touches():
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
     layer = build_layer(system.evaluate, pad, moving=True)

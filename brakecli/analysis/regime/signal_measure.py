@@ -66,7 +66,7 @@ class Heard:
         least = max(self.limits.negligible, hidden) * largest
         for steady_from in (0.0, 0.5):
             there = velocity.levels(self.smoothing, int(steady_from * self.samples), windows)
-            change, error = level_change(np.maximum(there, least))
+            change, error = map(float, level_change(np.maximum(there, least)))
             if steady(change, error, self.limits):
                 break
         was_loud = bool(levels[: windows // 2].max() >= largest)

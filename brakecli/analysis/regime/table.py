@@ -529,11 +529,12 @@ LOOKS: Rows = (
         longer=True,
     ),
 )
+_WITH_WAVES, _WITHOUT = (*CONTACT, *ROUGH), (*CONTACT, *SMOOTH)
 
 
 def decide(answers: Answers, thresholds: Thresholds) -> Decision:
     """What the first row says whose condition holds."""
-    found = first((*CONTACT, *(ROUGH if answers.waves else SMOOTH)), answers, thresholds)
+    found = first(_WITH_WAVES if answers.waves else _WITHOUT, answers, thresholds)
     if found.excitation is not Excitation.SELF_EXCITED:
         return found
     look = first(LOOKS, answers, thresholds)

@@ -6,7 +6,6 @@ in that phase changes f by the slope of the surface times that motion: see `_wit
 """
 
 import math
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
@@ -25,6 +24,7 @@ from brakecli.analysis.stability.modes import (
     is_undamped,
     stiffness_matrix,
 )
+from brakecli.solver.alike import at_once
 from brakecli.solver.compile import Floats as Array
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import Coefficients
@@ -81,44 +81,8 @@ class Linear:
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
-        found = self._sums(time, *self.waves.T, *(2j * math.pi * self.passing * self.waves.T))
+        found = _sums(self, time, np.array([*self.waves.T, *(2j * math.pi * self.passing * self.waves.T)]))
         return found[:2], found[2:]
-
-    def _sums(self, time: Array, *waves: Complex) -> Array:
-        """What has these amplitudes, with their phases at t = 0, at times (s), in rows."""
-        turns, rows = _turns(tuple(self.passing.tolist()), time.tobytes()), np.array(waves)
-        return np.asarray(np.concatenate([rows.real, rows.imag], axis=1) @ turns)
-
-    def _extremes(self, span: float) -> tuple[float, float]:
-        """Largest and least x (m) that the waves force within a time (s).
-
-        Where many meet is rare: blocks of time fill it, and the highest are looked at closely.
-        """
-        begins, turns, parts, near = _blocks(tuple(self.passing.tolist()), span)
-        begins = self.waves[:, :1] * begins
-        rows = np.concatenate([begins.imag, begins.real]).T.astype(np.float32)
-        x = (rows.reshape(-1, _FEW, rows.shape[1]) @ parts).reshape(len(rows), -1)
-        each, ups, downs = np.arange(len(x)), x.argmax(axis=1), x.argmin(axis=1)  # in half the time of max and min
-        high, low = x[each, ups].argsort()[-_HIGHEST:], x[each, downs].argsort()[:_HIGHEST]
-        tops = begins[:, high] * turns[:, ups[high]], begins[:, low] * turns[:, downs[low]]
-        found = [(top.T @ near).imag for top in tops]
-        return float(found[0].max()), float(found[1].min())
-
-    def parts(self, x: Array, time: Array) -> tuple[float, Array, Array, Array]:
-        """What the waves force: half of peak to peak of x (m), beyond the run too, as waves beat.
-
-        Then, at the times given, the x that they force and that the shoe adds (m), and the times again (s).
-        """
-        (lasting,) = self._sums(time, self.waves[:, 0])
-        high, low = self._extremes(_BEYOND * time[-1]) if len(self.waves) > 1 and self.belt else (0.0, 0.0)
-        size = 0.5 * (max(float(lasting.max()), high) - min(float(lasting.min()), low))
-        return size, lasting, x - self.rest[0] - lasting, time
-
-    def force_parts(self, y: Array, time: Array) -> tuple[float, Array]:
-        """Half of peak to peak of the normal force (N) that the waves force; what the shoe adds at the times."""
-        stiffness, waves = self.force / self.depth, self.waves[:, 1]
-        forced, lasting = self._sums(time, self.slopes / self.wavenumbers - stiffness * waves, waves)
-        return 0.5 * float(np.ptp(forced)), stiffness * (self.rest[1] + lasting - y)
 
     def stays(self, state: Array) -> bool:
         """Whether a motion on a smooth wheel that decays can neither stick nor open any more.
@@ -141,6 +105,57 @@ class Linear:
         _, y, vx, _ = size * np.abs(self.vectors[:, fastest])
         bounds = [bound / part for bound, part in ((abs(self.belt), vx), (self.depth, y)) if part > 0.0]
         return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
+
+
+def parts(theories: Sequence[Linear], x: Array, time: Array) -> tuple[Array, Array, Array]:
+    """What the waves force, by theories whose waves pass alike: half of peak to peak of x (m).
+
+    It is that of longer motions too, as waves beat. Then, at the times given (s), the x that they force and the x
+    that each shoe adds (m), in rows.
+    """
+    waves, rest = np.array([each.waves[:, 0] for each in theories]), np.array([each.rest[:1] for each in theories])
+    lasting = _sums(theories[0], time, waves[:, None])[:, 0]
+    high, low = lasting.max(axis=1), lasting.min(axis=1)
+    if waves.shape[1] > 1 and theories[0].belt:
+        beyond = _extremes(theories[0], waves, _BEYOND * time[-1])
+        high, low = np.maximum(high, beyond[0]), np.minimum(low, beyond[1])
+    return 0.5 * (high - low), lasting, x - rest - lasting
+
+
+def force_parts(theories: Sequence[Linear], y: Array, time: Array) -> tuple[Array, Array]:
+    """Half of peak to peak of the normal force (N) that the waves force; what each shoe adds to it, in rows."""
+    stiffness, rest = np.array([(each.force / each.depth, each.rest[1]) for each in theories]).T[..., None]
+    slopes, waves = np.array([(each.slopes, each.waves[:, 1]) for each in theories]).swapaxes(0, 1)
+    pressing = slopes / theories[0].wavenumbers - stiffness * waves
+    forced, lasting = _sums(theories[0], time, np.stack([pressing, waves], axis=1)).swapaxes(0, 1)
+    return 0.5 * np.ptp(forced, axis=1), stiffness * (rest + lasting - y)
+
+
+def _sums(theory: Linear, time: Array, waves: Complex) -> Array:
+    """What has these amplitudes, with their phases at t = 0, at times (s), in rows; of one theory, or of many."""
+    turns = _turns(tuple(theory.passing.tolist()), time.tobytes())
+    return np.asarray(np.concatenate([waves.real, waves.imag], axis=-1) @ turns)
+
+
+def _extremes(theory: Linear, waves: Complex, span: float) -> tuple[Array, Array]:
+    """Largest and least x (m) that waves force within a time (s), of each row of their amplitudes.
+
+    Where many meet is rare: blocks of time fill it, and the highest are looked at closely.
+    """
+    begins, turns, inside, near = _blocks(tuple(theory.passing.tolist()), span)
+    begins = waves[:, :, None] * begins
+    rows = np.concatenate([begins.imag, begins.real], axis=1).swapaxes(1, 2).astype(np.float32, order="C")
+    peaks, sizes, each = list[Any](), list[Any](), np.arange(rows.shape[1])
+    for row in rows:  # one at a time, which stays in the cache
+        x = (row.reshape(-1, _FEW, row.shape[1]) @ inside).reshape(len(row), -1)
+        peaks.append((x.argmax(axis=1), x.argmin(axis=1)))  # in half the time of max and min
+        sizes.append([x[each, time] for time in peaks[-1]])
+    order = np.array(sizes).argsort(axis=2)
+    highest = np.stack([order[:, 0, -_HIGHEST:], order[:, 1, :_HIGHEST]], axis=1)
+    times = np.take_along_axis(np.array(peaks), highest, axis=2)
+    tops = np.take_along_axis(begins[:, None], highest[:, :, None], axis=3) * np.moveaxis(turns[:, times], 0, 2)
+    found = (tops.swapaxes(2, 3) @ near).imag
+    return found[:, 0].max(axis=(1, 2)), found[:, 1].min(axis=(1, 2))
 
 
 @lru_cache(maxsize=1)  # the points of a sweep ask for the same ones
@@ -196,17 +211,15 @@ def _last_speed(system: System) -> float:
 
 def _by_waves(systems: Sequence[System], belts: Sequence[float]) -> list[Linear | None]:
     """The theory of each system at its speed; those with as many waves are computed at once."""
-    found: list[Linear | None] = [None] * len(systems)
-    alike = defaultdict[int, list[int]](list)
-    for i, (system, belt) in enumerate(zip(systems, belts, strict=True)):
-        if belt != 0.0 or system.coefficients.phi == 0.0:
-            alike[len(system.wheel.g)].append(i)
-    for members in alike.values():
-        with np.errstate(all="ignore"):  # what is not finite has no theory
-            theories = _theories([systems[i] for i in members], np.array([belts[i] for i in members]))
-        for i, theory in zip(members, theories, strict=True):
-            found[i] = theory
-    return found
+
+    def waves(system: System, belt: float) -> int | None:
+        return len(system.wheel.g) if belt != 0.0 or system.coefficients.phi == 0.0 else None
+
+    with np.errstate(all="ignore"):  # what is not finite has no theory
+        return at_once(
+            [*map(waves, systems, belts)],
+            lambda places: _theories([systems[i] for i in places], np.array([belts[i] for i in places])),
+        )
 
 
 def _solved(s: Any, f: Array) -> Any:

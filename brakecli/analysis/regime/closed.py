@@ -1,0 +1,125 @@
+"""The numbers of what lasts, and what they are of forced motions in closed form."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.regime.cycles import Cycles
+from brakecli.analysis.regime.evidence import WINDOWS, Part, trend
+from brakecli.analysis.regime.measure import Shown
+from brakecli.analysis.spectrum import Array
+from brakecli.analysis.stability.linear import Linear, force_parts, parts
+from brakecli.solver.alike import at_once
+from brakecli.solver.history import stacked
+
+RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
+_REST = 0.3  # of a forced motion, by which its closed form may be off
+_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+
+
+@dataclass
+class Lasting:
+    """The numbers of the settled part, in SI units; None where one is not known."""
+
+    part: Part
+    settled: bool
+    amplitude: float
+    spread: float | None = None
+    forced: float | None = None  # half of peak to peak of x that the roughness forces
+    own: float | None = None  # and that the shoe adds
+    forced_frequency: float | None = None  # of the wave that moves x most
+    mean_force: float = math.nan  # of the friction force
+    variation: float | None = None  # of it, peak to peak
+    frequency: float | None = None  # of cycles
+    cycles: Cycles | None = None  # of a vibration that lasts by itself
+    force_from: int = 0  # the sample from which on the force has settled: y may ring longer than x
+    force_rings: float | None = None  # for how long it still rings beside a settled x
+    longer: bool = True  # whether a longer run may settle what has not
+    notes: dict[str, str | None] = field(default_factory=dict)
+    evidence: dict[str, Any] = field(default_factory=dict)
+
+
+def forced_linear(shown: Sequence[Shown], decays: Sequence[float]) -> list[Lasting | None]:
+    """Forced motions in closed form, with the settled part in which what the shoe adds has died away.
+
+    None where the waves force more than the closed form has.
+    """
+    theories = [each.linear for each in shown if each.linear]
+    x, time = _whole(shown).places()
+    forced, lasting, own = parts(theories, x, time)
+    found = [*map(_closed, shown, theories, decays, forced.tolist(), _gone(shown, decays, own, forced))]
+    if settled := [each for each in zip(found, shown, decays, strict=True) if each[0] and each[0].settled]:
+        _settle_force(*zip(*settled, strict=True))
+    starts = [each and int(time.searchsorted(each.part.start * each.part.history.interval)) for each in found]
+    added = at_once(starts, lambda at: (0.5 * np.ptp(own[at, starts[at[0]] :], axis=1)).tolist())
+    for each, swing, adds in zip(found, (0.5 * np.ptp(lasting, axis=1)).tolist(), added, strict=True):
+        if each is not None:
+            each.own, each.spread = adds, adds + each.amplitude - swing if each.settled else None
+    return found
+
+
+def _settle_force(found: Sequence[Lasting], shown: Sequence[Shown], decays: Sequence[float]) -> None:
+    """Find from where on the friction forces have settled: y may ring longer than x."""
+    theories = [each.linear for each in shown if each.linear]
+    forced, rings = force_parts(theories, *_whole(shown).places("y"))
+    gone = _gone(shown, decays, rings, forced)
+    for each, theory, decay, left in zip(found, theories, decays, gone, strict=True):
+        if left.window <= WINDOWS - 10:
+            each.force_from = left.window * each.part.stop // WINDOWS
+        elif theory.slip is not None:
+            each.force_rings = _wait(decay, left)
+
+
+def _whole(shown: Sequence[Shown]) -> Part:
+    """All samples of many histories."""
+    return Part(stacked([each.history for each in shown]), 0, shown[0].samples)
+
+
+class _Gone(NamedTuple):
+    """What is left, beside what is forced, of what the shoe adds."""
+
+    window: int  # from which on it has gone
+    level: float  # to which it has then come
+    end: float  # what is left in the last quarter
+    stays: bool  # then it is forced, and missing in the closed form
+
+
+def _gone(shown: Sequence[Shown], decays: Sequence[float], own: Array, forced: Array) -> list[_Gone]:
+    """What becomes of what each shoe adds (in rows), which decays (1/s), beside what is forced."""
+    starts, within = -(-own.shape[1] * np.arange(WINDOWS) // WINDOWS), shown[0].limits.settled_within
+    high, low = (each.reduceat(own, starts, axis=1) for each in (np.maximum, np.minimum))
+    left = 0.5 * (high - low)
+    end = 0.5 * (high[:, -10:].max(axis=1) - low[:, -10:].min(axis=1))  # a window may be shorter than a period
+    change, _ = trend(np.log(np.maximum(left[:, WINDOWS // 2 :], 1e-300)))
+    lost = 0.5 * np.array(decays) * shown[0].duration
+    stays = (0.5 * lost > RELAXED) & (change > -0.25 * lost)
+    level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, 1.2 * end), within * forced)
+    late = (left > level[:, None])[:, ::-1]
+    window = np.where(late.any(axis=1), WINDOWS - late.argmax(axis=1), 1)
+    return [_Gone(*row) for row in zip(*(each.tolist() for each in (window, level, end, stays)), strict=True)]
+
+
+def _closed(shown: Shown, theory: Linear, decay: float, forced: float, gone: _Gone) -> Lasting | None:
+    """A forced motion in closed form, but for what the shoe adds."""
+    if gone.stays and gone.end >= _REST * forced:
+        return None
+    found = Lasting(shown.judged, False, forced, None, forced)
+    begin, slow = gone.window * shown.samples // WINDOWS, shown.slowest(0.0)
+    if gone.window <= WINDOWS - 10 and shown.duration - begin * shown.interval >= 2.0 * slow:
+        found.part, found.settled = shown.part(begin), True
+    else:
+        late = shown.duration + _wait(decay, gone)
+        needed = max(_LONGER * late, 1.05 * (late + 2.0 * slow))
+        found.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
+    seconds = shown.duration - max(min(shown.quarter * shown.interval, shown.duration - slow), 0.0)
+    if (beat := shown.beat()) > seconds and theory.opens:
+        found.notes["beat"] = f"the waves beat every {beat:.3g} s, which may open the pad again"
+    return found
+
+
+def _wait(decay: float, gone: _Gone) -> float:
+    """Time (s) until what is left, which decays at this rate (1/s), has come to its level."""
+    return math.log(max(gone.end / max(gone.level, 1e-300), 1.0)) / decay

@@ -1,0 +1,107 @@
+"""What the samples of histories show, of many at once: each number is computed for all of them together."""
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, FULL, LONGEST, WINDOWS, Part, level_change, tenths
+from brakecli.analysis.spectrum import Array
+from brakecli.solver.alike import at_once
+from brakecli.solver.history import History, stacked
+
+_LAST = slice(-10, None)  # windows that give the final values
+
+
+class Seen(NamedTuple):
+    """What a history shows, in SI units; nan where the samples are too few for that."""
+
+    state: float  # of the contact at the end
+    state_from: int  # the sample from which on it is that
+    full_from: int  # the sample from which on the whole pad touches; their number where it does not at the end
+    first: float  # half of peak to peak of x in the first tenth
+    final: float  # in the last tenth
+    swing: float  # in the second half
+    amplitude: float  # in the last quarter
+    level: float  # standard deviation of vx there
+    change: float = math.nan  # of the logarithm of the level within the second half
+    change_error: float = math.nan
+    final_level: float = math.nan  # in the last quarter, in the mean over windows
+    largest_level: float = math.nan
+    settled_from: int = 0  # the sample at which the settled part begins; 0 where there is none
+
+
+def seen(histories: Sequence[History], within: float) -> list[Seen]:
+    """What each history shows; a settled level changes by this part of itself at most."""
+
+    def of_those(places: list[int]) -> list[Seen]:
+        columns = _columns(stacked([histories[i] for i in places]), within)
+        return [Seen(*row) for row in zip(*(each.tolist() for each in columns), strict=True)]
+
+    return at_once([(each.interval, each.samples) for each in histories], of_those)
+
+
+def _columns(history: History, within: float) -> list[NDArray[Any]]:
+    """The numbers of `Seen`, of each of many histories."""
+    samples = history.samples
+    (first, last), whole = tenths(samples), Part(history, 0, samples)
+    state = history.read("state", samples - 1, samples)
+    quarter = Part(history, samples * (WINDOWS - 10) // WINDOWS, samples)
+    parts = Part(history, 0, first), Part(history, last, samples), Part(history, samples // 2, samples), quarter
+    columns = [
+        state[:, 0],
+        whole.since("state", lambda values: values == state),
+        whole.since("contact_fraction", lambda values: values >= FULL),
+        *(each.amplitude("x") for each in parts),
+        quarter.deviation("vx"),
+    ]
+    if samples < FEWEST_SAMPLES:
+        return columns
+    vx, least, largest = _windowed(history)
+    final = _final(vx)
+    window = _settled_window((vx, least, largest), within, 0.4 * within)
+    columns += [*level_change(vx[:, WINDOWS // 2 :]), final, vx.max(axis=1), window * samples // WINDOWS]
+    return columns
+
+
+@lru_cache(maxsize=4)
+def _windows(samples: int) -> tuple[NDArray[np.int_], NDArray[np.int_], NDArray[np.int_]]:
+    """The samples that begin equal windows, how many each holds, and where the window of each sample begins."""
+    edges = np.linspace(0, samples, WINDOWS + 1).astype(int)
+    return edges[:-1], np.diff(edges), np.repeat(edges[:-1], np.diff(edges))
+
+
+def _windowed(history: History) -> tuple[Array, Array, Array]:
+    """Standard deviation of vx (m/s), least and largest x (m) in equal windows, of each of many histories."""
+    if history.samples > LONGEST:
+        edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
+        windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
+        found = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows])
+        vx, least, largest = np.ascontiguousarray(found.transpose(1, 2, 0))
+        return vx, least, largest
+    x, vx = (history.read(name, 0, history.samples) for name in ("x", "vx"))
+    starts, counts, firsts = _windows(history.samples)
+    away = vx - vx[:, firsts]
+    mean, square = (np.add.reduceat(each, starts, axis=1) / counts for each in (away, away * away))
+    least, largest = (each.reduceat(x, starts, axis=1) for each in (np.minimum, np.maximum))
+    return np.sqrt(np.maximum(square - mean**2, 0.0)), least, largest
+
+
+def _final(values: Array) -> Array:
+    """Means of the last windows."""
+    return np.asarray(np.add.reduce(values[:, _LAST], axis=1) / 10.0)
+
+
+def _settled_window(windowed: tuple[Array, Array, Array], within: float, reach: float) -> NDArray[np.int_]:
+    """The windows, never the first, from which on all are settled; 0 where fewer than ten are."""
+    vx, least, largest = windowed
+    final, span = _final(vx), _final(largest - least)
+    settled = np.abs(vx - final[:, None]) <= within * final[:, None]
+    for bound in (least, largest):
+        settled &= np.abs(bound - _final(bound)[:, None]) <= reach * span[:, None]
+    first = np.where(settled.all(axis=1), 1, WINDOWS - settled[:, ::-1].argmin(axis=1))
+    return np.where(first <= WINDOWS - 10, first, 0)
