@@ -47,7 +47,7 @@ def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is
 
 @campaign
 def test_nine_in_ten_prices_of_random_runs_are_within_a_factor_of_three() -> None:
-    """The first cases of `make statistics`, of all kinds and methods; chance takes some more from so few."""
+    """The first of the cases of `make statistics`, of all kinds and methods; so few may miss by chance."""
     found = [each for number in range(CASES) if (each := priced((number, SEED)))]
     wrong = [str(each) for each in found if not each.right]
     assert len(found) > RIGHT * CASES
