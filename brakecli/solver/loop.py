@@ -112,6 +112,7 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
     """Note the events of the step from time t on, which has been taken, see `solver.track`.
 
     `phase` is what its solution says, v_before the velocity before and `before` its excess over the wheel's (m/s).
+    A stick begins where m |vx - U| = t (bound ± needed), and ends where bound - |needed| = 0 by its rate.
     """
     p = borrowed(p)
     c, track, state, problem, contact, h, lag = (
@@ -162,7 +163,11 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
 
 @kernel(void(PLANT, float64, float64), inlined=False)
 def _disturb(p: Plant, before: float, after: float) -> None:
-    """Carry the disturbance along the step that has been taken, with the sliding velocities at both ends."""
+    """Carry the disturbance along the step that has been taken, with the sliding velocities at both ends.
+
+    Where friction changes from one side to another, (6) gives how far into the step: θ = m |vx - U|/(h (bound +
+    side needed)). There a part of the disturbed velocity is kept; before, friction was that of the other side.
+    """
     p = borrowed(p)
     c, t, problem, contact, h, beside = p.c, p.tangent, p.problem, p.layer.contact, p.s.h, p.beside
     side, was, part, theta, lag = problem.side, t.side, 1.0, 0.0, p.grid.lag

@@ -90,7 +90,8 @@ def kept(needed: float, bound: float) -> float:
 def meet(beside: Beside, part: float, theta: float, h: float, lag: int) -> None:
     """Keep a part of the disturbed velocity from an event on, which lies at the part theta of a step h.
 
-    The velocity of a scheme that lags is the change of the place in the step before, in which the event lies.
+    δx += θ (1 - part) h δv_x, and δv_x becomes part δv_x. The velocity of a scheme that lags is the change of the
+    place in the step before, in which the event lies: there δx -= (1 - θ) (1 - part) (δx - δx_old).
     """
     b = beside.state
     if lag == 1:

@@ -39,7 +39,7 @@ _MOST = 8  # evaluations of the contact in a step
 
 @kernel(void(LANE_TYPE, SHARED, int64, float64), fastmath=ALIKE)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
-    """Sine and cosine of a wave of the wheel."""
+    """Sine and cosine of a wave of the wheel at the middle of the pad: of ωx + φ - 2π t times `rate`."""
     omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
     for n in range(LANES):
         turns = o.rate[i, n] * t
@@ -51,7 +51,8 @@ def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
 def _add_nodes(o: Any, shared: Shared) -> None:
     """The midpoint sum of the gaps (m), how many nodes touch, and the gaps themselves.
 
-    What is even in f2 and what is odd give two opposite gaps from the table of one node.
+    The gap at ξ is f2 - f1 - y, where f2 = Σ g (sin cos ωξ + cos sin ωξ) by the sine and cosine of each wave. What
+    is even in ξ and what is odd give the gaps at ξ and -ξ from the table of one node.
     """
     table, gaps, at, pair = shared.table, shared.gaps, 0, 2 * PAIR
     for n in range(LANES):
@@ -73,7 +74,10 @@ def _add_nodes(o: Any, shared: Shared) -> None:
 
 @kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE, inlined=False)
 def _touch(o: Any, shared: Shared, t: float) -> None:
-    """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes."""
+    """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes.
+
+    F_y = k ∫ max(f2 - f1 - y, 0) dξ; of a pad that touches everywhere it is k (Σ wave sin - length (y + mean f1)).
+    """
     shared = borrowed(shared)
     waves, length, full, clear = shared.waves, shared.length, shared.full_up_to, shared.clear_from
     for i in range(WAVES):
@@ -134,6 +138,9 @@ def _begin(o: Any, shared: Shared) -> None:
 def _prepare(o: Any, shared: Shared) -> None:
     """The known part of (6) and (7) over three levels, and the guess of the force as in `loop.advance`.
 
+    With z = (x, y), w = (d, e) and the forces F = (φF_y, F_y) it is g = 2m (z^n - z^{n-1})/h² - C (θ2 z^n +
+    (θ3 + θ1) z^{n-1}) - θ1 B (2w^n - w^{n-1}) + θ2 F^n + θ3 F^{n-1} - N (sin β, cos β); the guess is
+    3 (F^n - F^{n-1}) + F^{n-2}.
     The mean of three velocities is d - (d^{n+1} - 2d + d^{n-1})/12, taken a level earlier.
     """
     h = shared.h
@@ -156,7 +163,11 @@ def _prepare(o: Any, shared: Shared) -> None:
 
 @kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE)
 def _iterate(o: Any, shared: Shared, t: float) -> None:
-    """The force of the next level in `guess`: as (13), until what is left is below the bound."""
+    """The force of the next level in `guess`: as (13), until what is left is below the bound.
+
+    z^{n+1} = z^{n-1} + 2h a⁻¹ (g + θ1 (φ, 1) F) by (15) and (16), and the next F adds (F_y(z) - F)/(1 + answer
+    times the part that touches), which is Newton's method.
+    """
     h = shared.h
     for _ in range(_MOST):
         for n in range(LANES):
@@ -180,7 +191,10 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
 
 @kernel(void(LANE_TYPE, SHARED))
 def _finish(o: Any, shared: Shared) -> None:
-    """The next level; a lane is out where the shoe slips to its side no more, or (13) did not converge."""
+    """The next level; a lane is out where the shoe slips to its side no more, or (13) did not converge.
+
+    w = a⁻¹ (g + θ1 (φ, 1) F) and z^{n+1} = z^{n-1} + 2h w.
+    """
     h = shared.h
     for n in range(LANES):
         f_x, f_y = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n], o.g_2[n] + THETA_1 * o.guess[n]
@@ -196,7 +210,10 @@ def _finish(o: Any, shared: Shared) -> None:
 
 @kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], int64), fastmath=ALIKE)
 def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
-    """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative."""
+    """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative.
+
+    v = w - h²/6 w'', where m w'' are the forces by (6) and (7) of w, 2 (z^{n+1} - z^n - h w)/h² and dF_y/dt.
+    """
     h = shared.h
     part, squared = h * h / 6.0 if number else 0.0, 2.0 / (h * h)
     for n in range(LANES):

@@ -37,7 +37,11 @@ NEAR = 3.0
 
 @kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _miss(o: Any, shared: Shared) -> None:
-    """What the motion misses of (6) and (7) with steps twice as long, between the last three even levels."""
+    """What the motion misses of (6) and (7) with steps twice as long, between the last three even levels.
+
+    The source is 2/7 of (θ1 (φ, 1) F^{n+1} + θ2 … + θ3 … - B w - C z - N (sin β, cos β)) - m (z^{n+1} - 2z^n +
+    z^{n-1})/(4h²), weighed as in the steps.
+    """
     h = 2.0 * shared.h
     for n in range(LANES):
         o.even_x[2, n], o.even_x[1, n], o.even_x[0, n] = o.even_x[1, n], o.even_x[0, n], o.x[n]
@@ -67,7 +71,10 @@ def _miss(o: Any, shared: Shared) -> None:
 
 @kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
 def _begin(o: Any, shared: Shared) -> None:
-    """At the second level: the error of the first one, by a start with a step twice as long."""
+    """At the second level: the error of the first one, by a start with a step twice as long.
+
+    It is 1/14 of z⁰ + h v⁰ + h² (2a⁰ + a¹)/6 - z¹ with h twice as long.
+    """
     h = 2.0 * shared.h
     for n in range(LANES):
         x, y, v_x, v_y = o.even_x[0, n], o.even_y[0, n], o.even_d[0, n], o.even_e[0, n]
@@ -87,13 +94,20 @@ def _begin(o: Any, shared: Shared) -> None:
 
 @kernel(boolean(float64, float64, float64), fastmath=ALIKE)
 def _hides(before: float, gap: float, after: float) -> bool:
-    """Whether the gap in the middle is so near zero beside its bend that a patch, or a hole, may lie beside it."""
+    """Whether the gap in the middle is so near zero beside its bend that a patch, or a hole, may lie beside it.
+
+    Its bend g₋ - 2g + g₊ is more than six times g, and all three have one sign.
+    """
     return before * gap + after * gap > 8.0 * gap * gap and before * gap > 0.0 and after * gap >= 0.0
 
 
 @kernel(void(LANE_TYPE, vector, int64), fastmath=ALIKE, inlined=False)
 def _add_hidden(o: Any, gaps: Floats, at: int) -> None:
-    """Add what three nodes leave out, in spacings: a patch, or a hole, between them."""
+    """Add what three nodes leave out, in spacings: a patch, or a hole, between them.
+
+    With the bend b = g₋ - 2g + g₊ a parabola has the extreme c = g - b/24 - (g₊ - g₋)²/(8b), and beyond its zeros
+    the area 4/3 |c| √(2|c/b|).
+    """
     for n in range(LANES):
         before, gap, after = gaps[at + n], gaps[at + PAIR + n], gaps[at + 2 * PAIR + n]
         bend = before - 2.0 * gap + after
@@ -160,7 +174,11 @@ def _contact(o: Any, shared: Shared) -> None:
 
 @kernel(void(LANE_TYPE, SHARED, int64), fastmath=ALIKE)
 def _move(o: Any, shared: Shared, kind: int) -> None:
-    """Carry one of them to the older level of the motion, by the derivative of its steps."""
+    """Carry one of them to the older level of the motion, by the derivative of its steps.
+
+    It is the step for (δx, δy) without the load, where δF_y = ∂F_y/∂x δx + ∂F_y/∂y δy is solved for. Sources of
+    steps stand beside the forces, and what nodes leave out is a part of δF_y.
+    """
     h, by_steps, by_nodes = shared.h, 1.0 if kind == STEPS else 0.0, 2.0 if kind == NODES else 0.0
     for n in range(LANES):
         inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.t_x_old[kind, n], o.t_y_old[kind, n]
@@ -193,7 +211,7 @@ def _move(o: Any, shared: Shared, kind: int) -> None:
 
 @kernel(float64(float64))
 def _size(error: float) -> float:
-    """Its absolute value; infinite where a motion has amplified it beyond all numbers."""
+    """|error|; infinite where a motion has amplified it beyond all numbers."""
     return abs(error) if abs(error) < math.inf else math.inf
 
 
