@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from paper_pictures import GREY, ORANGE, STYLE
 from PIL import Image
 
-from brakecli.analysis.regime.table import Thresholds
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run

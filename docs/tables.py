@@ -11,8 +11,10 @@ With --check nothing is written: the exit code is 1 where a page does not agree 
 import re
 import sys
 from pathlib import Path
+from typing import Any
 
 from brakecli.analysis.regime import table as verdicts
+from brakecli.analysis.regime.decision import Excitation, Regime, Row
 from brakecli.files import contents, fields, stability_fields
 
 PLACE = re.compile(r"(<!-- fields ([A-Z_ ]+) -->\n).*?(<!-- end of fields -->)", re.DOTALL)
@@ -42,11 +44,11 @@ def rows(name: str, old: str) -> str:
     return "\n".join([*lines, "", ""])
 
 
-def verdict(row: verdicts.Row) -> str:
+def verdict(row: Row[Any, Any]) -> str:
     """What a row says."""
-    if (row.regime, row.excitation) == (verdicts.Regime.UNDECIDED, verdicts.Excitation.SELF_EXCITED):
+    if (row.regime, row.excitation) == (Regime.UNDECIDED, Excitation.SELF_EXCITED):
         return "self-excited; see its look"
-    return str(row.regime) if row.excitation is verdicts.Excitation.NONE else f"{row.regime}, {row.excitation}"
+    return str(row.regime) if row.excitation is Excitation.NONE else f"{row.regime}, {row.excitation}"
 
 
 def main() -> int:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from brakecli.analysis.regime.table import Thresholds
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.modes import crossings, growth, stiffness_matrix
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case

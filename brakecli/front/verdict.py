@@ -32,7 +32,7 @@ def verdict_on(source: str, measured: Measured, thresholds: list[str] | None) ->
 
 
 def _on_result(source: str, thresholds: list[str] | None) -> dict[str, Any]:
-    from brakecli.analysis.regime.table import Thresholds
+    from brakecli.analysis.regime.decision import Thresholds
     from brakecli.runs.stored import classify_result
 
     limits = changed(Thresholds, thresholds)

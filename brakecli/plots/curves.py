@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.table import Excitation
+from brakecli.analysis.regime.decision import Excitation
 from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.windows import Outcome

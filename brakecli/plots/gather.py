@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from brakecli.analysis.regime.table import Excitation
+from brakecli.analysis.regime.decision import Excitation
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError
 from brakecli.faces import argument

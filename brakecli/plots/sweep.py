@@ -10,7 +10,7 @@ from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.plots import style
 from brakecli.plots.axis import Axis
 from brakecli.sweeps.point import Status

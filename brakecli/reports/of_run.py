@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.advice import KEYS, Change
 from brakecli.analysis.stability.follow import followed
 from brakecli.analysis.stability.modes import Mode, modes

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError, escaped
 from brakecli.files import fields

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.colors import to_hex
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.plots import style
 from brakecli.plots.axis import Axis
 from brakecli.plots.maps import slices

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability import advice as of_case
 from brakecli.analysis.stability.advice import Change, Left, Sensitivity

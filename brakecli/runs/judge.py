@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import context
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.measure import Continued, Given
-from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
 from brakecli.runs.certificate import Certificate

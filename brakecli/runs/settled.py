@@ -9,7 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Generic, NamedTuple, Protocol, TypeVar
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.parts import SETTLED
 from brakecli.runs.certificate import Certificate

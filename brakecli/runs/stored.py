@@ -8,7 +8,8 @@ from typing import Any, NamedTuple
 
 from brakecli.analysis.over_time import over_time
 from brakecli.analysis.regime.answers import Answers
-from brakecli.analysis.regime.table import Excitation, Regime, Thresholds, decide
+from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
+from brakecli.analysis.regime.table import decide
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UnreadableResultError

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.probability import Probability
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem

@@ -18,8 +18,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from brakecli.analysis.regime.answers import Answers, Fate
+from brakecli.analysis.regime.decision import Regime, Thresholds
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, tenths
-from brakecli.analysis.regime.table import Regime, Thresholds, decide
+from brakecli.analysis.regime.table import decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Linear, Theory, linear_theory
 from brakecli.analysis.stability.modes import is_undamped

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.classify import classify
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory, theories_of
 from brakecli.branches.line import Line

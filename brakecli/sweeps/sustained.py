@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.table import Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped

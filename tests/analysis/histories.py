@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.measure import Continued, Given
-from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.runs.judge import asked, verdict_in_memory

@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
-from brakecli.analysis.regime.table import Regime
 
 Array = NDArray[np.float64]
 

@@ -13,7 +13,8 @@ import numpy as np
 import tomli_w
 
 from brakecli.analysis.regime.answers import Answers
-from brakecli.analysis.regime.table import Thresholds, decide
+from brakecli.analysis.regime.decision import Thresholds
+from brakecli.analysis.regime.table import decide
 from brakecli.case.read import parse_case
 from brakecli.files.read import open_result
 from brakecli.runs.run import run

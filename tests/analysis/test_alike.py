@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.spectrum import peak, spectrum
 from brakecli.case.system import system_of
 from brakecli.solver.quantities import ContactState

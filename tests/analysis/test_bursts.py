@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.bursts import bursts
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.of_signal import Measurand, Signal, look
-from brakecli.analysis.regime.table import Regime
 
 RATE = 20000.0
 TIME = np.arange(int(RATE)) / RATE

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of

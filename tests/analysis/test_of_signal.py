@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
 from brakecli.analysis.regime.signal_table import SignalThresholds
-from brakecli.analysis.regime.table import Excitation, Regime
 from tests.analysis.measured_signals import (
     Array,
     clipped,

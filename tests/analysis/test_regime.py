@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.answers import Fate
 from brakecli.analysis.regime.context import Context
+from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.regime.spectra import forced_lines
-from brakecli.analysis.regime.table import Excitation, Regime, Thresholds
 from brakecli.solver.history import History
 from brakecli.solver.track import MIN, SLIP, STICK, Events
 from tests.analysis.histories import INTERVAL, classified, history_of, lasting, track_of, verdict_of

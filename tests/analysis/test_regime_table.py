@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of

@@ -6,8 +6,8 @@ import h5py
 import numpy as np
 import pytest
 
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
-from brakecli.analysis.regime.table import Regime
 from tests.analysis.measured_signals import Array
 from tests.campaign import counts
 

@@ -7,16 +7,9 @@ from typing import Any
 import pytest
 
 from brakecli.analysis.regime.answers import Answers, Fate
-from brakecli.analysis.regime.table import (
-    CONTACT,
-    LOOKS,
-    ROUGH,
-    SMOOTH,
-    Excitation,
-    Regime,
-    Thresholds,
-    decide,
-)
+from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
+from brakecli.analysis.regime.looks import LOOKS
+from brakecli.analysis.regime.table import CONTACT, ROUGH, SMOOTH, decide
 
 LIMITS = Thresholds()
 MOVING = Answers(

@@ -9,7 +9,7 @@ import tomli_w
 
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.table import Excitation, Regime
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.linear import linear_theory, parts
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case

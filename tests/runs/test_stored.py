@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import tomli_w
 
-from brakecli.analysis.regime.table import Thresholds
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.case.read import parse_case
 from brakecli.runs import stored
 from brakecli.runs.run import run

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.table import Decision, Regime
+from brakecli.analysis.regime.decision import Decision, Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.branches.answers import Answers
 from brakecli.branches.begin import on_smooth_pads, settled

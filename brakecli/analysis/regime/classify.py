@@ -7,10 +7,11 @@ from typing import Any
 from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.closed import Lasting
 from brakecli.analysis.regime.context import Context
+from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.regime.lasting import lasting
 from brakecli.analysis.regime.measure import Given, Shown, answers
 from brakecli.analysis.regime.seen import seen
-from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds, decide
+from brakecli.analysis.regime.table import decide
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.spectrum import segment
 from brakecli.solver.quantities import ContactState

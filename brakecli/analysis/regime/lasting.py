@@ -10,9 +10,9 @@ import numpy as np
 from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.closed import RELAXED, Lasting, forced_linear
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
+from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.measure import Shown
-from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.stability.linear import parts
 from brakecli.solver.alike import at_once
 from brakecli.solver.history import History, stacked

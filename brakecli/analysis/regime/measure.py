@@ -10,9 +10,9 @@ import numpy as np
 from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, WINDOWS, Part, windowed
 from brakecli.analysis.regime.seen import Seen
-from brakecli.analysis.regime.table import Thresholds
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState

@@ -9,10 +9,10 @@ import numpy as np
 
 from brakecli.analysis.regime.bursts import Burst, bursts
 from brakecli.analysis.regime.cleaning import Velocity, bridged, cleaned, without_drift
+from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.signal_measure import Heard, answers
 from brakecli.analysis.regime.signal_table import SignalThresholds, decide
 from brakecli.analysis.regime.stick import Slips, seek
-from brakecli.analysis.regime.table import Excitation, Regime
 from brakecli.analysis.spectrum import Array
 
 _MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record

@@ -6,7 +6,7 @@ Nothing here looks at a signal. Rows are tried from the top, and the first whose
 import math
 from dataclasses import dataclass
 
-from brakecli.analysis.regime.table import Decision, Regime, Row, first
+from brakecli.analysis.regime.decision import Decision, Regime, Row, first
 from brakecli.faces import argument
 
 FEWEST_SAMPLES = 64

@@ -5,151 +5,23 @@ says that the motion lasts by itself leaves it to the rows of `LOOKS` how it loo
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from enum import StrEnum
-from typing import Any, Generic, NamedTuple, TypeVar
 
 from brakecli.analysis.regime.answers import Answers, Fate
-
-
-class Regime(StrEnum):
-    """The paper's three regimes, and `undecided`."""
-
-    DAMPED = "damped"
-    RELAXATION = "relaxation"
-    QUASI_HARMONIC = "quasi-harmonic"
-    UNDECIDED = "undecided"
-
-
-class Excitation(StrEnum):
-    """Where the energy of a sustained motion comes from."""
-
-    SELF_EXCITED = "self-excited"
-    FORCED = "forced"
-    NONE = "none"
-
-
-@dataclass(frozen=True)
-class Thresholds:
-    """The only numbers that decide a verdict: see docs/regimes.md, and `make statistics` for what each moves."""
-
-    settled_within: float = 0.05  # part of its level by which a settled motion may change
-    sure_errors: float = 3.0  # standard errors beyond which a change is no chance
-    comes_together: float = 1.0  # powers of e by which neighbours that come together do so in half of the run
-    same_level: float = 0.3  # part by which two motions of the same level may differ
-    most: float = 2.0  # times the power of the other, of what gives most of the energy
-    fewest_cycles: float = 10.0  # in the settled part
-    samples_per_cycle: float = 8.0
-    stick_cycles: float = 0.8  # part of the cycles that stick in relaxation; in 1 less it, others may
-    harmonic_share: float = 0.8  # part of the energy on one line and its multiples
-    band_share: float = 0.9  # part of it in three narrow bands, which chaos may have, too
-
-
-class Decision(NamedTuple):
-    """What a row decides, and why."""
-
-    reason: str
-    regime: Regime = Regime.UNDECIDED
-    excitation: Excitation = Excitation.NONE
-    frequency: float | None = None  # Hz
-    stick_fraction: float | None = None
-    advice: str = ""  # what to do
-    row: str = ""  # its name
-    longer: bool = False  # whether a longer run may decide
-
-    @property
-    def sentence(self) -> str:
-        """The reason, and what to do."""
-        return f"{self.reason}; {self.advice}" if self.advice else self.reason
-
-
-A = TypeVar("A")  # the answers
-T = TypeVar("T")  # and the thresholds of a table
-
-
-class Row(NamedTuple, Generic[A, T]):
-    """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers.
-
-    `longer` says whether a longer run may decide where the row does not.
-    """
-
-    name: str
-    holds: Callable[[A, T], Any]
-    sentence: str
-    remedy: str = ""
-    regime: Regime = Regime.UNDECIDED
-    excitation: Excitation = Excitation.NONE
-    longer: bool | Callable[[A], Any] = False
-
-    def decision(self, answers: A) -> Decision:
-        """What it says of these answers."""
-        reason, advice = (text.format(a=answers) for text in (self.sentence, self.remedy))
-        longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
-        return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
-
-
-def _steady(a: Answers, t: Thresholds) -> bool:
-    """The level does not change, but for chance."""
-    return abs(a.change) <= max(t.sure_errors * a.change_error, 2.0 * t.settled_within)
-
-
-def _together(a: Answers, t: Thresholds) -> bool:
-    """Neighbours of the motion come together."""
-    return a.powers(a.exponent) < -max(t.comes_together, t.sure_errors * a.powers(a.exponent_error))
-
-
-def _apart(a: Answers, t: Thresholds) -> bool:
-    """Nothing shows that neighbours come together, however slowly: the motion may have a phase of its own."""
-    return a.exponent >= -t.sure_errors * a.exponent_error
-
-
-def _same(a: Answers, t: Thresholds) -> bool:
-    """The motion has the level that it would have on the smooth wheel."""
-    return abs(a.level - a.level_without_waves) <= t.same_level * a.level_without_waves
-
-
-def _another(a: Answers, t: Thresholds) -> bool:
-    """It has another level than it would come to on the smooth wheel."""
-    return math.isfinite(a.level_without_waves) and not _same(a, t)
-
-
-def _comes_to_it(a: Answers, t: Thresholds) -> bool:
-    """What it will look like is how the limit cycle of the smooth wheel looks, and not yet its own cycles."""
-    return not a.waves or not _steady(a, t)
-
-
-def _gives(a: Answers, t: Thresholds) -> bool:
-    return a.power_of_friction > t.sure_errors * a.friction_error
-
-
-def _friction_gives_most(a: Answers, t: Thresholds) -> bool:
-    error = math.hypot(a.friction_error, t.most * a.roughness_error)
-    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) > t.sure_errors * error
-
-
-def _roughness_gives_most(a: Answers, t: Thresholds) -> bool:
-    error = math.hypot(a.roughness_error, t.most * a.friction_error)
-    return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > t.sure_errors * error
-
-
-def _regular(a: Answers, t: Thresholds) -> bool:
-    return a.harmonic_share >= t.harmonic_share or a.band_share >= t.band_share
-
-
-def _takes(a: Answers, t: Thresholds) -> bool:
-    return a.power_of_friction < -t.sure_errors * a.friction_error
-
-
-def _decays(a: Answers, t: Thresholds) -> bool:
-    rate, error = a.rate(t.sure_errors)
-    return rate < -error
-
-
-def _grows(a: Answers, t: Thresholds) -> bool:
-    rate, error = a.rate(t.sure_errors)
-    return rate > error
-
+from brakecli.analysis.regime.conditions import (
+    another,
+    apart,
+    decays,
+    friction_gives_most,
+    gives,
+    grows,
+    roughness_gives_most,
+    same,
+    steady,
+    takes,
+    together,
+)
+from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Row, Thresholds, first
+from brakecli.analysis.regime.looks import LOOKS
 
 _DAMPED, _FORCED = Regime.DAMPED, (Regime.DAMPED, Excitation.FORCED)
 _OWN = Regime.UNDECIDED, Excitation.SELF_EXCITED  # how it looks, `LOOKS` decides
@@ -157,8 +29,7 @@ _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
 
-Rows = tuple[Row[Answers, Thresholds], ...]
-CONTACT: Rows = (
+CONTACT: tuple[Row[Answers, Thresholds], ...] = (
     Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
     Row("older file", lambda a, t: a.unasked, "the file is older than the questions that decide", "{a.unasked}"),
     Row("never touched", lambda a, t: a.never, "the shoe has never touched the wheel", _CHECK),
@@ -239,23 +110,23 @@ COMES_AND_GOES: Row[Answers, Thresholds] = Row(
     "run longer",
     longer=True,
 )
-SMOOTH: Rows = (
+SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "linear, held by the steps",
-        lambda a, t: a.linear and _grows(a, t) and a.steadier,
+        lambda a, t: a.linear and grows(a, t) and a.steadier,
         _LINEAR + ": it grows at {a.own:.3g} 1/s, but the scheme's steps damp it",
         "{a.steadier}",
     ),
     Row(
         "linear, grows",
-        lambda a, t: a.linear and _grows(a, t),
+        lambda a, t: a.linear and grows(a, t),
         _LINEAR + ": still growing at {a.own:.3g} 1/s ({a.ringing:.4g} Hz)",
         "run at least {a.grown:.3g} s",
         longer=True,
     ),
     Row(
         "linear, decays",
-        lambda a, t: a.linear and _decays(a, t),
+        lambda a, t: a.linear and decays(a, t),
         _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)",
         "",
         _DAMPED,
@@ -289,7 +160,7 @@ SMOOTH: Rows = (
     ),
     Row(
         "lasts",
-        lambda a, t: a.without_waves == Fate.LASTS and _same(a, t),
+        lambda a, t: a.without_waves == Fate.LASTS and same(a, t),
         "the vibration lasts: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m",
         "",
         *_OWN,
@@ -303,7 +174,7 @@ SMOOTH: Rows = (
     ),
     Row(
         "lasts, irregular",
-        lambda a, t: a.without_waves == Fate.LASTS and _steady(a, t),
+        lambda a, t: a.without_waves == Fate.LASTS and steady(a, t),
         "the vibration lasts, as sliding is unstable, and its level does not change",
         "",
         *_OWN,
@@ -317,7 +188,7 @@ SMOOTH: Rows = (
         longer=True,
     ),
 )
-ROUGH: Rows = (
+ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "shorter than a wave",
         lambda a, t: a.duration < a.slowest,
@@ -328,7 +199,7 @@ ROUGH: Rows = (
     *SMOOTH[:1],
     Row(
         "linear, forced",
-        lambda a, t: a.linear and _decays(a, t) and not a.undamped,
+        lambda a, t: a.linear and decays(a, t) and not a.undamped,
         "only the roughness shakes the shoe: " + SMOOTH[2].sentence,
         "",
         *_FORCED,
@@ -357,7 +228,7 @@ ROUGH: Rows = (
     ),
     Row(
         "forced, neighbours",
-        lambda a, t: a.without_waves == Fate.DIES and _together(a, t),
+        lambda a, t: a.without_waves == Fate.DIES and together(a, t),
         "only the roughness shakes the shoe: without it the vibration dies out, and neighbours come together at "
         "{a.exponent:.3g} 1/s",
         "",
@@ -367,8 +238,8 @@ ROUGH: Rows = (
         "forced, level",
         lambda a, t: (
             a.without_waves == Fate.DIES
-            and (_steady(a, t) or a.change < 0.0)
-            and not _friction_gives_most(a, t)
+            and (steady(a, t) or a.change < 0.0)
+            and not friction_gives_most(a, t)
             and not a.undamped
         ),
         "only the roughness shakes the shoe: without it the vibration dies out, and its level does not grow",
@@ -377,14 +248,14 @@ ROUGH: Rows = (
     ),
     Row(
         "forced, friction takes",
-        lambda a, t: _takes(a, t) and (_steady(a, t) or a.without_waves == Fate.DIES) and not a.undamped,
+        lambda a, t: takes(a, t) and (steady(a, t) or a.without_waves == Fate.DIES) and not a.undamped,
         "only the roughness shakes the shoe: friction takes {a.power_of_friction:.2g} W from the vibration",
         "",
         *_FORCED,
     ),
     Row(
         "forced, roughness gives",
-        lambda a, t: _together(a, t) and _steady(a, t) and _roughness_gives_most(a, t) and not a.undamped,
+        lambda a, t: together(a, t) and steady(a, t) and roughness_gives_most(a, t) and not a.undamped,
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
         "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
         "",
@@ -392,7 +263,7 @@ ROUGH: Rows = (
     ),
     Row(
         "forced, another level",
-        lambda a, t: _together(a, t) and _steady(a, t) and _another(a, t) and not a.undamped,
+        lambda a, t: together(a, t) and steady(a, t) and another(a, t) and not a.undamped,
         "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, and vx has "
         "{a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the roughness",
         "",
@@ -400,7 +271,7 @@ ROUGH: Rows = (
     ),
     Row(
         "dies out, not yet",
-        lambda a, t: a.without_waves == Fate.DIES and not _steady(a, t),
+        lambda a, t: a.without_waves == Fate.DIES and not steady(a, t),
         "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
         "second half",
         "run at least {a.waited:.3g} s",
@@ -416,9 +287,9 @@ ROUGH: Rows = (
         "self-excited",
         lambda a, t: (
             a.without_waves == Fate.LASTS
-            and _apart(a, t)
-            and (a.growth > 0.0 or (_steady(a, t) and not _another(a, t)))
-            and _gives(a, t)
+            and apart(a, t)
+            and (a.growth > 0.0 or (steady(a, t) and not another(a, t)))
+            and gives(a, t)
             and not a.undamped
         ),
         "the vibration lasts without the roughness, with a phase of its own",
@@ -429,10 +300,10 @@ ROUGH: Rows = (
         "locked to the waves",
         lambda a, t: (
             a.without_waves == Fate.LASTS
-            and _together(a, t)
-            and _steady(a, t)
-            and _same(a, t)
-            and _friction_gives_most(a, t)
+            and together(a, t)
+            and steady(a, t)
+            and same(a, t)
+            and friction_gives_most(a, t)
         ),
         "the vibration lasts without the roughness at the same level, and is locked to it",
         "",
@@ -441,7 +312,7 @@ ROUGH: Rows = (
     COMES_AND_GOES,
     Row(
         "still changes",
-        lambda a, t: not _steady(a, t),
+        lambda a, t: not steady(a, t),
         "the level {a.word} by e^{a.change:.2g} in the second half",
         "run at least {a.longer:.3g} s",
         longer=True,
@@ -455,80 +326,6 @@ ROUGH: Rows = (
         longer=True,
     ),
 )
-LOOKS: Rows = (
-    Row(
-        "few cycles",
-        lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
-        "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
-        "run longer",
-        longer=True,
-    ),
-    Row(
-        "few steps in a cycle",
-        lambda a, t: a.steps_per_cycle < t.samples_per_cycle,
-        "but only {a.steps_per_cycle:.1f} steps a cycle",
-        "reduce solver.step and output.sample_interval",
-    ),
-    Row(
-        "few samples in a cycle",
-        lambda a, t: a.samples_per_cycle < t.samples_per_cycle,
-        "but only {a.samples_per_cycle:.1f} samples a cycle",
-        "reduce output.sample_interval",
-    ),
-    Row(
-        "shorter than two waves",
-        lambda a, t: a.seconds < 2.0 * a.slowest,
-        "but the settled part holds less than two periods of the slowest wave, {a.slowest:.3g} s",
-        "run at least {a.two_waves:.3g} s",
-        longer=True,
-    ),
-    Row(
-        "limit cycle with stick",
-        lambda a, t: a.sticks_without_waves >= 1.0 and _comes_to_it(a, t),
-        "in a limit cycle of {a.ends_at:.4g} Hz with stick",
-        "",
-        Regime.RELAXATION,
-        Excitation.SELF_EXCITED,
-    ),
-    Row(
-        "limit cycle without stick",
-        lambda a, t: a.sticks_without_waves == 0.0 and _comes_to_it(a, t),
-        "in a limit cycle of {a.ends_at:.4g} Hz without stick",
-        "",
-        Regime.QUASI_HARMONIC,
-        Excitation.SELF_EXCITED,
-    ),
-    Row(
-        "on its way",
-        lambda a, t: a.waves and not _steady(a, t),
-        "but its level still {a.word} by e^{a.change:.2g} in the second half, which changes how it looks",
-        "run at least {a.longer:.3g} s",
-        longer=True,
-    ),
-    Row(
-        "relaxation",
-        lambda a, t: a.stick_cycles >= t.stick_cycles,
-        "with stick in {a.stick_cycles:.0%} of {a.cycles:.0f} cycles",
-        "",
-        Regime.RELAXATION,
-        Excitation.SELF_EXCITED,
-    ),
-    Row(
-        "quasi-harmonic",
-        lambda a, t: a.stick_cycles <= 1.0 - t.stick_cycles and _regular(a, t),
-        "{a.sticks}: {a.lines}",
-        "",
-        Regime.QUASI_HARMONIC,
-        Excitation.SELF_EXCITED,
-    ),
-    Row(
-        "irregular",
-        lambda a, t: True,
-        "irregular: stick in {a.stick_cycles:.0%} of the cycles, {a.lines}",
-        "run longer, or look at the spectrum",
-        longer=True,
-    ),
-)
 _WITH_WAVES, _WITHOUT = (*CONTACT, *ROUGH), (*CONTACT, *SMOOTH)
 
 
@@ -539,8 +336,3 @@ def decide(answers: Answers, thresholds: Thresholds) -> Decision:
         return found
     look = first(LOOKS, answers, thresholds)
     return look._replace(reason=f"{found.reason}, {look.reason}", row=f"{found.row}: {look.row}")
-
-
-def first(rows: tuple[Row[A, T], ...], answers: A, thresholds: T) -> Decision:
-    """What the first row of a table says whose condition holds."""
-    return next(row for row in rows if row.holds(answers, thresholds)).decision(answers)

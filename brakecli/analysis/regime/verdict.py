@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any
 
-from brakecli.analysis.regime.table import Decision, Excitation, Regime, Thresholds
+from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 
 FADED = 0.01
 """Part of the level of a damped vibration at its strongest that is nothing any more."""
