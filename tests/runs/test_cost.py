@@ -23,7 +23,7 @@ from brakecli.solver.system import System
 from tests.campaign import campaign
 from tests.examples import ROUGH, SQUEAL, make
 
-CASES = 50
+CASES = 20
 
 
 def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is_refused_if_they_take_days(
