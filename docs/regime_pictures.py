@@ -350,13 +350,16 @@ def panel(axis: Axes, example: Example) -> None:
     axis.set_title(f"{example.title}\n{verdict(shown.numbers)}", fontsize=9)
 
 
-def gallery(name: str, examples: tuple[Example, ...], rows: int) -> None:
-    """All examples of a kind of wheel."""
+def gallery(name: str, examples: tuple[Example, ...]) -> None:
+    """All examples of a kind of wheel, three in a row."""
+    rows = -(-len(examples) // 3)
     figure = Figure(figsize=(9.6, 2.5 * rows + 0.4))
     figure.set_layout_engine("constrained")
-    panels = figure.subplots(rows, 3).flat
-    for axis, example in zip(panels, examples, strict=True):
+    panels = figure.subplots(rows, 3).ravel()
+    for axis, example in zip(panels, examples, strict=False):
         panel(axis, example)
+    for axis in panels[len(examples) :]:
+        axis.set_axis_off()
     for axis in figure.axes[::3]:
         axis.set_ylabel("vx (mm/s)")
     for axis in figure.axes[-3:]:
@@ -413,8 +416,8 @@ def save(figure: Figure, name: str) -> None:
 def main() -> None:
     """Draw them all."""
     with style.context(["default", STYLE]):
-        gallery("smooth", SMOOTH, 4)
-        gallery("rough", ROUGH, 4)
+        gallery("smooth", SMOOTH)
+        gallery("rough", ROUGH)
         looks()
 
 
