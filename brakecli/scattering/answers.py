@@ -25,6 +25,16 @@ class Indices:
     )  # half of the 95 % interval of the total index, by resampling
     note: str = ""  # why there are none
 
+    @property
+    def first(self) -> list[str]:
+        """The parameters that decide most, the largest first: with it those whose 95 % intervals reach its own."""
+        order = sorted(self.total, key=lambda name: -self.total[name])
+        return [
+            name
+            for name in order
+            if self.total[name] + self.error[name] >= self.total[order[0]] - self.error[order[0]]
+        ]
+
     @classmethod
     def find(cls, of: str, names: tuple[str, ...], answers: Floats, seed: int) -> "Indices":
         """From the answers of the samples of `draw.for_indices`: sets, samples."""

@@ -89,9 +89,10 @@ class ScatterReport:
         found = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
         if self.failed:
             found += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
-        if total := self.indices.total:
-            first = max(total, key=lambda name: total[name])
-            found += f"; {first} decides most on {self.indices.of.replace('_', ' ')}, by {total[first]:.0%}"
+        if first := self.indices.first:
+            by = " and ".join(f"{self.indices.total[name]:.0%}" for name in first)
+            decide = "decides" if len(first) == 1 else "decide"
+            found += f"; {' and '.join(first)} {decide} most on {self.indices.of.replace('_', ' ')}, by {by}"
         return found
 
     def numbers(self) -> dict[str, Any]:

@@ -166,6 +166,13 @@ def test_indices_of_the_ishigami_function_are_those_of_its_closed_form() -> None
     assert [*found.total.values()] == pytest.approx(total, abs=0.02)
 
 
+def test_parameters_that_errors_do_not_tell_apart_decide_together() -> None:
+    total = {"a": 0.46, "b": 0.47, "c": 0.08}
+    assert Indices("squeal", {}, total, dict.fromkeys(total, 0.02)).first == ["b", "a"]
+    assert Indices("squeal", {}, total, dict.fromkeys(total, 0.004)).first == ["b"]
+    assert Indices("squeal").first == []
+
+
 @pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "random"])
 @pytest.mark.parametrize("margin", [0.5, 2.0])
 @pytest.mark.parametrize("replications", counts(60, 400))
