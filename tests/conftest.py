@@ -26,3 +26,9 @@ if worker := os.environ.get("PYTEST_XDIST_WORKER"):
 def compiled() -> None:
     """Kernels, so that no command of a test has to compile them, or to say that it does."""
     warm_up()
+
+
+@pytest.fixture
+def without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Searches for critical values without the runs that say from where on vibration lasts."""
+    monkeypatch.setattr("brakecli.sweeps.sustained.verdict_of", lambda case: None)

@@ -13,6 +13,7 @@ from scipy.optimize import brentq
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.modes import crossings, growth, stiffness_matrix
 from brakecli.analysis.stability.report import stability
+from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -20,7 +21,7 @@ from brakecli.front.inputs import load_sweep
 from brakecli.solver.roughness import TWO_PI
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.plan import kind_of
-from brakecli.sweeps.point import simulate
+from brakecli.sweeps.simulate import simulate
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign, differences, statistics
@@ -52,7 +53,7 @@ def critical(name: str, settings: dict[str, float]) -> float:
 
 def simulated(name: str, settings: dict[str, float], upper: float) -> Search:
     wanted = Critical(parameter="friction.coefficient", lower=0.0, upper=upper)
-    found = search(wanted, lambda phi: case(name, {**settings, "friction.coefficient": phi}), lambda _: None)
+    found = search(wanted, Line(case(name, settings), [wanted.parameter], 0.0, upper))
     assert found.outcome is Outcome.FOUND
     return found
 
@@ -109,6 +110,7 @@ def test_eigenvalues_give_the_least_critical_friction_at_c1_plus_k(share: float)
         assert at(stiffness) < min(at(0.99 * stiffness), at(1.01 * stiffness))
 
 
+@pytest.mark.usefixtures("without_runs")
 @pytest.mark.parametrize("share", [0.05, 0.2, 1.0])
 def test_simulation_gives_the_least_critical_friction_at_c1_plus_k(share: float) -> None:
     least = (1.0 + 1.0 / share) * TAN5
@@ -124,6 +126,7 @@ def test_simulation_gives_the_least_critical_friction_at_c1_plus_k(share: float)
     assert values[0] - errors[0] > values[1] + errors[1] < values[2] - errors[2]
 
 
+@pytest.mark.usefixtures("without_runs")
 @pytest.mark.parametrize(
     ("damping", "speed"), [(0.0, 4.0), (300.0, 4.0), pytest.param(300.0, 0.4, marks=campaign)]
 )

@@ -66,7 +66,7 @@ def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
     c, stiffness, belt, load = shoe
     if shoe.rest is None or not shoe.rest[1] < 0.0:  # it locks, or would hang off the wheel
         return UNKNOWN
-    values, shapes = eigensystem(c, stiffness, math.copysign(c.phi, belt))
+    values, shapes = eigensystem(c, stiffness, c.grip(belt))
     modes = values, np.concatenate([shapes, shapes * values])
     try:
         motion = Pursuit(c, (stiffness, belt, load), state, np.array(shoe.rest), modes)

@@ -11,7 +11,7 @@ from brakecli.errors import CaseError
 from brakecli.errors import Problem as Wrong
 from brakecli.solver.flow.rough import default_cells, default_steps
 from brakecli.solver.period import LONGEST, common_period
-from brakecli.solver.steady_sliding import steady_sliding, tabulated
+from brakecli.solver.steady_sliding import sliding, tabulated
 from brakecli.solver.system import System
 
 PLACES = 33
@@ -75,8 +75,5 @@ def frame_of(line: Line, per_period: float) -> Frame:
 
 def resting(system: System) -> Array | None:
     """Steady sliding as a state; None where there is none."""
-    try:
-        found = steady_sliding(system, mean=tabulated(system))
-    except CaseError:
-        return None
-    return np.array([found.x, found.y, 0.0, 0.0])
+    found = sliding(system, tabulated(system))
+    return np.array([found.x, found.y, 0.0, 0.0]) if found else None

@@ -1,6 +1,5 @@
 """A case along a line: keys that take the same value, from one end of a range to the other."""
 
-import math
 from collections.abc import Callable, Sequence
 from copy import deepcopy
 from dataclasses import replace
@@ -51,7 +50,7 @@ class Shoe(NamedTuple):
     def rest(self) -> tuple[float, float] | None:
         """x and y (m) of steady sliding: (6)-(7) without motion, linear in full contact. None where it locks."""
         c, k = self.coefficients, self.stiffness
-        s_xy, s_yy = c.c_xy + math.copysign(c.phi, self.belt) * k, c.c_yy + k
+        s_xy, s_yy = c.c_xy + c.grip(self.belt) * k, c.c_yy + k
         determinant, q_x, q_y = c.c_xx * s_yy - s_xy * c.c_xy, self.load * c.sin_beta, self.load * c.cos_beta
         if not determinant > 0.0:
             return None
@@ -110,11 +109,15 @@ class Line:
 
     def case_at(self, p: float) -> Case:
         """The case at p; raises CaseError where it is not valid."""
+        return self.case_with(self.value(p))
+
+    def case_with(self, value: float) -> Case:
+        """The case whose keys have a value; raises CaseError where it is not valid."""
         data = dict(self._given)
         for path in self._paths:
             data[path[0]] = deepcopy(self._given.get(path[0], {}))
         for path in self._paths:
-            put(data, path, self.value(p), Case, kept=self._paths)
+            put(data, path, value, Case, kept=self._paths)
         try:
             return Case.model_validate(data)
         except ValidationError as error:

@@ -86,7 +86,7 @@ class Sliding:
         locks = line.smooth and rest is None
         if belt == 0.0 or not (pressed or locks):
             return nothing
-        grip = math.copysign(c.phi, belt)
+        grip = c.grip(belt)
         b, links = (c.b_xx, c.b_xy, c.b_yy), (c.c_xx, c.c_xy, c.c_yy)
         determinant, apart = routh_hurwitz(c.m, b, links, stiffness, grip, damped=not is_undamped(c))
         if locks:  # beyond divergence there is no steady sliding, and the determinant says where it ended

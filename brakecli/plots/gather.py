@@ -18,7 +18,7 @@ from brakecli.plots.axis import Axis
 from brakecli.plots.sweep import ATTRACTOR, FORCED_PART, MARGIN, MOST_PANELS, SweepPicture
 from brakecli.sweeps.margin import margins
 from brakecli.sweeps.plan import Plan, label
-from brakecli.sweeps.point import Status
+from brakecli.sweeps.record import Status
 from brakecli.sweeps.tables import Sweep
 
 _NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")

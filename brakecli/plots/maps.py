@@ -15,7 +15,7 @@ from matplotlib.ticker import MaxNLocator
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
-from brakecli.sweeps.point import Status
+from brakecli.sweeps.record import Status
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps

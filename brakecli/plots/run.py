@@ -3,9 +3,7 @@
 The history is read in pieces: a run of 10^8 samples takes no more memory than a short one.
 """
 
-import math
 from collections.abc import Callable
-from contextlib import suppress
 from functools import partial
 from typing import Any
 
@@ -25,7 +23,7 @@ from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
 from brakecli.runs.cost import stability_seconds, table_seconds
 from brakecli.runs.limits import WORTH_SAYING
 from brakecli.solver.quantities import ContactState
-from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 
 CYCLES = 12  # drawn in detail
@@ -107,11 +105,8 @@ def _mode_frequencies(system: System) -> list[float]:
     """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
     if stability_seconds(system) + table_seconds(system) > WORTH_SAYING:
         return []
-    stiffness = system.contact_stiffness
-    with suppress(CaseError):
-        stiffness = steady_sliding(system).stiffness
-    belt, phi = system.belt_speed, system.coefficients.phi
-    found = modes(system.coefficients, stiffness, math.copysign(phi, belt) if belt else 0.0)
+    c, rest = system.coefficients, sliding(system)
+    found = modes(c, rest.stiffness if rest else system.contact_stiffness, c.grip(system.belt_speed))
     return sorted(mode.frequency for mode in found if mode.frequency > 0.0)
 
 

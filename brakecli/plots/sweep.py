@@ -13,7 +13,7 @@ from matplotlib.layout_engine import ConstrainedLayoutEngine
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.plots import style
 from brakecli.plots.axis import Axis
-from brakecli.sweeps.point import Status
+from brakecli.sweeps.record import Status
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome
 

@@ -49,7 +49,7 @@ from brakecli.reports.blocks import (
 from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
 from brakecli.scattering.study import Study
-from brakecli.sweeps.point import Status
+from brakecli.sweeps.record import Status
 
 MOST_FAILURES = 20
 _NONE_AT_0 = ("error", "amplitude", "frequency")  # of a special point: 0 says that there is none

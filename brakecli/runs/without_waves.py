@@ -1,6 +1,5 @@
 """What becomes of a motion without the waves: continued from its last state on the smooth wheel."""
 
-import math
 from dataclasses import replace
 
 import numpy as np
@@ -10,14 +9,13 @@ from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.stability.modes import growth, is_undamped
 from brakecli.branches.begin import UNKNOWN, End, on_smooth_pads
 from brakecli.branches.line import Shoe
-from brakecli.errors import CaseError
 from brakecli.solver.automaton import STICK
 from brakecli.solver.compile import Floats
 from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.motion import solve
 from brakecli.solver.motions import V_X
 from brakecli.solver.roughness import surface
-from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import Initial, System
 
 LONGEST = 16.0
@@ -63,10 +61,8 @@ def _on_a_rough_shoe(flat: System, state: Floats) -> End:
 
     if is_undamped(flat.coefficients):
         return UNKNOWN
-    try:
-        rest = steady_sliding(flat)
-    except CaseError:
+    if (rest := sliding(flat)) is None:
         return UNKNOWN
-    if growth(flat.coefficients, rest.stiffness, math.copysign(flat.coefficients.phi, flat.belt_speed)) > 0.0:
+    if growth(flat.coefficients, rest.stiffness, flat.coefficients.grip(flat.belt_speed)) > 0.0:
         return End(None, state)
     return on_rough_pads(flat, state, [np.array([rest.x, rest.y, 0.0, 0.0])], LONGEST * flat.sampled_duration)

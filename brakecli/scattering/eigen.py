@@ -13,7 +13,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError, CaseError, Problem
 from brakecli.runs.limits import within_range
 from brakecli.solver.motion import Counted
-from brakecli.solver.steady_sliding import UNPRESSED, steady_sliding
+from brakecli.solver.steady_sliding import UNPRESSED, sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.driver import TaskQueue
 from brakecli.sweeps.plan import Plan
@@ -72,12 +72,9 @@ def _asked(system: System, band: tuple[float, ...] | None) -> tuple[float, float
     c, belt = system.coefficients, system.belt_speed
     if belt == 0.0:
         raise CaseError([Problem(("wheel",), "the wheel stands, so that nothing slides", "give it a speed")])
-    try:
-        rest = steady_sliding(system)
-    except CaseError:
-        rest = None
+    rest = sliding(system)
     k = rest.stiffness if rest else system.contact_stiffness
-    mode = _counting(modes(c, k, math.copysign(c.phi, belt)), band)
+    mode = _counting(modes(c, k, c.grip(belt)), band)
     if not (rest.is_pressed(system.load_at_start) if rest else system.load_at_start > 0.0 and mode.growth > 0.0):
         raise CaseError([Problem(("load",), UNPRESSED, "press the shoe onto the wheel")])
     critical = critical_friction(system, k)

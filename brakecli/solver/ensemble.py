@@ -15,7 +15,6 @@ from typing import Any
 import numpy as np
 
 from brakecli import stop
-from brakecli.errors import CaseError
 from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
@@ -26,7 +25,7 @@ from brakecli.solver.quantities import HISTORY
 from brakecli.solver.records import PARTS, Coefficients
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
-from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import Initial, System
 from brakecli.solver.tangent import FEWEST_SAMPLES, LEAST, MOST, Exponent, exponents
 
@@ -160,8 +159,5 @@ def _seed(o: Any, rate: Floats, h: float) -> None:
 def _start(system: System) -> tuple[float, float, float, float]:
     """x, y, vx and vy at t = 0; NaN where there is no steady sliding to start from."""
     initial = system.initial
-    try:
-        rest = steady_sliding(system) if initial.from_equilibrium else Initial()
-    except CaseError:
-        rest = Initial(math.nan)
+    rest = (sliding(system) or Initial(math.nan)) if initial.from_equilibrium else Initial()
     return initial.x + rest.x, initial.y + rest.y, initial.vx, initial.vy

@@ -1,5 +1,6 @@
 """What compiled code works on: records with named fields, what is given to a step, signatures of the plug-ins."""
 
+import math
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -204,6 +205,10 @@ class Coefficients(NamedTuple):
     sin_beta: float  # Q_x = Q sin(beta)
     cos_beta: float  # Q_y = Q cos(beta)
     phi: float
+
+    def grip(self, belt: float) -> float:
+        """φ sign(U), the friction force of steady sliding over the normal force; 0 where the wheel stands."""
+        return math.copysign(self.phi, belt) if belt else 0.0
 
 
 class Weights(NamedTuple):

@@ -1,6 +1,7 @@
 """Steady sliding: the position at which (6)-(7) hold without motion, averaged over the wheel's roughness."""
 
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any
@@ -185,6 +186,13 @@ def steady_sliding(
     force, stiffness, fraction = mean(float(y))
     x = (grip * force - q_x) / c.c_xx - lean * y if c.c_xx > 0.0 else 0.0
     return SteadySliding(float(x), float(y), force, stiffness, fraction)
+
+
+def sliding(system: System, mean: Mean | None = None, phi: float | None = None) -> SteadySliding | None:
+    """Steady sliding as `steady_sliding` finds it; None where there is none."""
+    with suppress(CaseError):
+        return steady_sliding(system, mean=mean, phi=phi)
+    return None
 
 
 def _none(reason: str) -> CaseError:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.sweeps.journal import Journal
-from brakecli.sweeps.point import Status
+from brakecli.sweeps.record import Status
 
 if TYPE_CHECKING:
     from brakecli.analysis.probability import Probability

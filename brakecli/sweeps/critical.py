@@ -12,13 +12,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.certain import EPSILON, Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN, stability
 from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
+from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
@@ -38,17 +38,9 @@ Signs = list[Rounded] | None
 EdgeIn = Callable[[float, float], Edge]
 
 
-def search(
-    critical: Critical,
-    case_at: Callable[[float], Case],
-    verdict_of: Callable[[Case], Verdict | None],
-    own: float | None = None,
-) -> Search:
-    """Look for the critical value of the parameter that `case_at` sets; `verdict_of` runs a case.
-
-    `own`: the value of the parameter in the case itself.
-    """
-    case_at = cache(case_at)
+def search(critical: Critical, line: Line) -> Search:
+    """Look for the critical value of the parameter along a line of cases."""
+    case_at = cache(line.case_with)
     steady_at = cache(partial(_steady, case_at))
     if critical.parameter == "friction.coefficient":
         exact = _friction_by_eigenvalues(critical, case_at(critical.lower))
@@ -58,19 +50,19 @@ def search(
         return exact
     case = case_at(critical.lower)
     explorer, found, waves = explored(critical, case), exact, bool(system_of(case).wheel.g.size)
-    answers = Answers(explorer.explored, own)
+    answers = Answers(explorer.explored, line.own)
     if waves:
         repeats = explorer.waves is not None
         found = on_waves(critical, answers) if repeats else by_exponents(critical, steady_at)
         found = found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
-    lasting = sustained(answers, critical.tolerance, found, verdict_of)
+    lasting = sustained(answers, critical.tolerance, found)
     coexists = [answers.coexists_from]
     if lasting.at is not None and found.unstable_at(lasting.at) is False:
         notes = [*explorer.notes]
         explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
         explorer.notes = notes  # a user has given no motion
-        answers = Answers(explorer.explored, own)
+        answers = Answers(explorer.explored, line.own)
         coexists += [answers.coexists_from, lasting.at]  # it need not be periodic
     undamped = is_undamped(system_of(case).coefficients)
     told = not waves or not (explorer.waves is None or undamped or found.outcome is Outcome.UNDECIDED)
@@ -107,7 +99,7 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
             system, links = system_of(case_at(value)), links_of(case_at(value))
         except CaseError:
             return None
-        grip = math.copysign(system.coefficients.phi, system.belt_speed)
+        grip = system.coefficients.grip(system.belt_speed)
         if not system.smooth:
             return conditions(links, found[1].stiffness, grip) if (found := steady_at(value)) else None
         if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:

@@ -22,7 +22,7 @@ from brakecli.solver.motion import Counted
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan
-from brakecli.sweeps.point import Status, blank, unsound
+from brakecli.sweeps.record import Status, blank, unsound
 from brakecli.sweeps.result import Findings, SweepReport, write
 from brakecli.sweeps.workers.local import CallerEngine, LocalEngine
 from brakecli.sweeps.workers.task import Compute, Engine, Task, compute_units

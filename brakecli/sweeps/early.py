@@ -119,7 +119,7 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
 
     fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
-    force = math.copysign(system.coefficients.phi, theory.belt) * -system.contact_stiffness * float(height)
+    force = system.coefficients.grip(theory.belt) * -system.contact_stiffness * float(height)
     answers = Answers(duration=end, linear=True, growth=theory.mode.growth, ringing=theory.mode.frequency)
     if theory.direction > 0:
         answers = answers._replace(to_limit=theory.seconds_to_limit(end, last))

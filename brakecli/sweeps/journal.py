@@ -28,7 +28,7 @@ from brakecli.files.field import flat
 from brakecli.files.os_signals import lastly
 from brakecli.files.toml_lines import parse
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import Status, record_type, unsound
+from brakecli.sweeps.record import Status, record_type, unsound
 from brakecli.sweeps.workers.task import fingerprint
 
 _PLACE = struct.Struct("<qqI")  # first unit, units, bytes of their records, which are packed

@@ -23,7 +23,8 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.system import MOST_STEPS
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed, judged, judged_together
+from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed
+from brakecli.sweeps.simulate import judged, judged_together
 
 SECONDS = 1.0
 """Processor time (s) after which no further place is drawn. Other programs do not change it."""

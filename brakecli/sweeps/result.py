@@ -24,7 +24,7 @@ from brakecli.runs.run import origin
 from brakecli.sweeps.attractors import SAME_AMPLITUDE, Attractor, Attractors
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.plan import LoadedSweep, Plan, label
-from brakecli.sweeps.point import Status
+from brakecli.sweeps.record import Status
 from brakecli.sweeps.short_runs import on_short_runs
 from brakecli.sweeps.tables import Axis
 

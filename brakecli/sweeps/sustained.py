@@ -1,14 +1,12 @@
 """From which value of a parameter on vibration lasts from the case's own start."""
 
 import math
-from collections.abc import Callable
 from functools import cache
 from typing import NamedTuple
 
 import numpy as np
 
 from brakecli.analysis.regime.decision import Regime
-from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
@@ -19,12 +17,12 @@ from brakecli.branches.problem import Array
 from brakecli.branches.rough_end import on_rough_pads
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError
 from brakecli.runs.limits import within_range
 from brakecli.solver.period import common_period
-from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.read_off import calm
+from brakecli.sweeps.simulate import verdict_of
 from brakecli.sweeps.windows import Outcome, Search
 
 GALLOP = 2.0
@@ -49,9 +47,7 @@ class Lasting(NamedTuple):
     at: float | None = None
 
 
-def sustained(
-    answers: Answers, tolerance: float, found: Search, verdict_of: Callable[[Case], Verdict | None]
-) -> Lasting:
+def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
     """Look for the least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
     From where stability is lost, as was `found`, the search strides down, ever faster, and then narrows down by
@@ -63,7 +59,7 @@ def sustained(
 
     @cache
     def end(value: float) -> End:
-        return LASTS if found.unstable_at(value) else _end(answers, value, verdict_of)
+        return LASTS if found.unstable_at(value) else _end(answers, value)
 
     def ended(value: float | None, outcome: Outcome) -> Lasting:
         shown = [each for each in seen if end(each).state is not None]
@@ -93,7 +89,7 @@ def sustained(
     return ended(0.5 * (fading + lasting), Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
 
 
-def _end(answers: Answers, value: float, verdict_of: Callable[[Case], Verdict | None]) -> End:
+def _end(answers: Answers, value: float) -> End:
     """What the case's own start comes to: by the flow of the equations, whatever scheme the case has.
 
     Runs of the case decide where no motion repeats, no dashpot damps, no link holds the shoe or the wheel rests,
@@ -106,19 +102,17 @@ def _end(answers: Answers, value: float, verdict_of: Callable[[Case], Verdict | 
     slides = system.belt_speed != 0.0 and system.natural_frequencies[0] > 0.0  # and links hold it
     repeats = system.steady and (not waves or common_period(system) is not None)
     if is_undamped(system.coefficients) or not (slides and repeats):
-        return _by_runs(case, system, verdict_of)
+        return _by_runs(case, system)
     if system.smooth:
         shoe = Shoe.of(system)
         return UNKNOWN if shoe.rest is None else on_smooth_pads(shoe, system.initial.beside(shoe.rest))
-    try:
-        rest = steady_sliding(system)
-    except CaseError:
+    if (rest := sliding(system)) is None:
         return UNKNOWN
     known = calm(answers, value) if waves else [np.array([rest.x, rest.y, 0.0, 0.0])]
     return on_rough_pads(system, system.initial.beside((rest.x, rest.y)), known)
 
 
-def _by_runs(case: Case, system: System, verdict_of: Callable[[Case], Verdict | None]) -> End:
+def _by_runs(case: Case, system: System) -> End:
     """Whether vibration lasts by the verdicts on runs, each twice as long as the one before.
 
     It is asked where sliding is not known to be unstable. So in full contact what neither sticks nor lifts off

@@ -152,7 +152,7 @@ def test_the_critical_value_of_the_search_is_an_end_of_stability(many: int) -> N
         branch = both_ways(problem, begun(problem), Settings(seconds=60.0))
         ends = [each.p for each in branch.specials if each.kind in ("torus", "flip", "fold")]
         step = Critical(parameter=FRICTION, lower=line.low, upper=line.high, tolerance=1e-3 * line.high)
-        found = search(step, lambda value: make(tables, friction__coefficient=value), lambda case: None)  # noqa: B023
+        found = search(step, Line(make(tables), [FRICTION], line.low, line.high))
         if found.upper is not None and branch.points[0].stable:
             away = [abs(line.value(p) - found.windows[0][0]) for p in ends]
             assert min(away) < 3e-3 * line.high + found.window_errors[0][0], seed

@@ -13,7 +13,8 @@ from brakecli.branches.thresholds import FRICTION, Thresholds, thresholds
 from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
 from brakecli.runs.branch import branch, line_of
-from brakecli.sweeps.point import PointRun, next_start, simulate
+from brakecli.sweeps.point import next_start
+from brakecli.sweeps.simulate import PointRun, simulate
 from tests.analysis.shoes import Tables
 from tests.branches.smooth_shoes import changed, first
 from tests.campaign import campaign

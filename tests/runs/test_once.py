@@ -24,21 +24,24 @@ ASKED = {
     "pilot": ("brakecli.runs.price", "measured"),
     "limits": ("brakecli.runs.limits", "check"),
     "modes and forced motion": ("brakecli.analysis.stability.linear", "linear_theory"),
+    "steady sliding": ("brakecli.solver.steady_sliding", "steady_sliding"),
     "tables of the contact": ("brakecli.solver.contact.pad", "build_pad"),
 }
 
+Counts = Counter[tuple[str, int, float | None]]
+
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, int]]:
-    """Calls of each function for each system, or for so many nodes; a pad without nodes has no tables."""
-    counts, kept = Counter[tuple[str, int]](), list[Any]()
+def asked(monkeypatch: pytest.MonkeyPatch) -> Counts:
+    """Calls of each function for each system and friction, or number of nodes (none: no tables)."""
+    counts, kept = Counts(), list[Any]()
 
     def counting(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
         def counted(*given: Any, **options: Any) -> Any:
             kept.append(given)  # so that no other object gets this place in memory
             of = id(given[0]) if function.__name__ != "build_pad" else given[4]
-            counts[name, of] += of > 0
+            counts[name, of, options.get("phi")] += of > 0
             return function(*given, **options)
 
         return counted
@@ -59,26 +62,26 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Counter[tuple[str, int]]:
         ("cases/accuracy/C.toml", ["solver={tolerance=1e-3,duration=0.05}"]),
     ],
 )
-def test_a_run_asks_once(case: str, settings: list[str], asked: Counter[tuple[str, int]], tmp_path: Path) -> None:
+def test_a_run_asks_once(case: str, settings: list[str], asked: Counts, tmp_path: Path) -> None:
     run(load_case(str(ROOT / case), settings), tmp_path / "r.h5", force=False)
     assert asked
-    assert {what for (what, _), count in asked.items() if count > 1} == set()
-    assert sum(count for (what, _), count in asked.items() if what == "price") == 1
-    assert sum(count for (what, _), count in asked.items() if what == "modes and forced motion") <= 1
+    assert {what for (what, *_), count in asked.items() if count > 1} == set()
+    assert sum(count for (what, *_), count in asked.items() if what == "price") == 1
+    assert sum(count for (what, *_), count in asked.items() if what == "modes and forced motion") <= 1
 
 
-def test_a_point_of_a_sweep_asks_once(asked: Counter[tuple[str, int]], tmp_path: Path) -> None:
+def test_a_point_of_a_sweep_asks_once(asked: Counts, tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     (tmp_path / "s.toml").write_text(
         'case = "tiny.toml"\n[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.3]\n'
     )
     compute_units(load_sweep(str(tmp_path / "s.toml"), None).plan, 0, 1)
     assert asked
-    assert {what for (what, _), count in asked.items() if count > 1} == set()
+    assert {what for (what, *_), count in asked.items() if count > 1} == set()
 
 
-def test_a_comparison_asks_once(asked: Counter[tuple[str, int]]) -> None:
+def test_a_comparison_asks_once(asked: Counts) -> None:
     case: Case = make(ROUGH, solver__duration=0.005)
     compare(system_of(case), schemes=["two-layer"], steps=[1e-5, 5e-6], budget=5.0)
     assert asked
-    assert {what for (what, _), count in asked.items() if count > 1} == set()
+    assert {what for (what, *_), count in asked.items() if count > 1} == set()

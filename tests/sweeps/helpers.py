@@ -22,7 +22,7 @@ from brakecli.files.os_signals import handle_signals
 from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.plan import LoadedSweep, Plan
-from brakecli.sweeps.point import Status, blank, record_type
+from brakecli.sweeps.record import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.dask import ClusterEngine
 from brakecli.sweeps.workers.local import LocalEngine

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.sweeps.plan import Plan
-from brakecli.sweeps.point import Status, blank, record_type
+from brakecli.sweeps.record import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport
 from tests.sweeps.helpers import axis, inline, write_sweep
 

@@ -13,7 +13,7 @@ import tomli_w
 
 from brakecli.branches.answers import Answers
 from brakecli.branches.explore import crossing
-from brakecli.case.case import Case
+from brakecli.branches.line import Line
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.read_off import explored
 from brakecli.sweeps.tables import Critical
@@ -23,6 +23,8 @@ from tests.commands import brakecli
 from tests.examples import make
 from tests.sweeps.independent import Tables, Wheel, forced, smooth_is_unstable
 from tests.sweeps.shoes import drawn
+
+pytestmark = pytest.mark.usefixtures("without_runs")
 
 SEEDS = {  # shoes with a critical value in their range
     "opening": [2, 5, 6, 7, 8, 9, 10, 11, 13, 15, 16, 17, 19, 21, 26, 28, 29, 30, 31, 34],
@@ -41,11 +43,8 @@ def answer(kind: str, seed: int) -> tuple[Search, Tables, str, float, float]:
     """What a search finds, without its runs for the least sustained value; and what was searched."""
     tables, key, lower, upper, tolerance = drawn(seed, kind)
     critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper, tolerance=tolerance)
-
-    def case_at(value: float) -> Case:
-        return make(tables, **{key: value})
-
-    return search(critical, case_at, lambda case: None), tables, key, lower, upper
+    found = search(critical, Line(make(tables), [critical.parameter], lower, upper))
+    return found, tables, key, lower, upper
 
 
 def at(tables: Tables, key: str, value: float) -> Tables:
@@ -131,7 +130,7 @@ def test_the_truth_lies_within_the_error_bars_of_all_windows(tables: Tables, upp
         "friction__coefficient",
         Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=1e-4),
     )
-    found = search(critical, lambda value: make(tables, **{key: value}), lambda case: None)
+    found = search(critical, Line(make(tables), [critical.parameter], critical.lower, critical.upper))
     ends, errors = np.ravel(found.windows), np.ravel(found.window_errors)
     assert (found.value, found.error) == (ends[0], errors[0])
     assert len(found.windows) == windows
@@ -173,7 +172,7 @@ def test_a_narrow_window_lies_where_the_scheme_vibrates_at_half_the_frequency_of
         "solver": {"duration": 0.3, "step": 0.00026},
     }
     key, critical = "friction__coefficient", Critical(parameter="friction.coefficient", lower=1.4, upper=2.2)
-    found = search(critical, lambda value: make(tables, **{key: value}), lambda case: None)
+    found = search(critical, Line(make(tables), [critical.parameter], critical.lower, critical.upper))
     assert found.value is not None
     assert found.error is not None
     assert changes_within(tables, key, found.value, found.error, 1.4)
@@ -185,7 +184,7 @@ def test_a_loss_of_stability_that_only_the_scheme_has_does_not_count() -> None:
     assert smooth_is_unstable(at(tables, key, lower))
     critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper)
     smooth = {name: table for name, table in tables.items() if name != "roughness"}
-    for found in (rough, search(critical, lambda value: make(smooth, **{key: value}), lambda case: None)):
+    for found in (rough, search(critical, Line(make(smooth), [critical.parameter], lower, upper))):
         assert found.outcome is Outcome.REGAINED
         assert found.value is not None
         assert found.error is not None

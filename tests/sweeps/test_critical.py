@@ -10,7 +10,7 @@ import pytest
 from brakecli.analysis.stability.report import stability
 from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
-from brakecli.case.case import Case, changed
+from brakecli.case.case import changed
 from brakecli.case.system import system_of
 from brakecli.front.inputs import load_sweep
 from brakecli.solver.links import natural_frequencies
@@ -20,7 +20,7 @@ from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.lyapunov import exponent
-from brakecli.sweeps.point import verdict_of
+from brakecli.sweeps.simulate import verdict_of
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
 from tests.analysis.test_regime_table import random_case
@@ -64,11 +64,7 @@ def found(
     search_keys = {name: value for name, value in changes.items() if "__" not in name}
     case_keys = {name: value for name, value in changes.items() if "__" in name}
     critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper, **search_keys)
-
-    def case_at(value: float) -> Case:
-        return make(tables, **{**case_keys, key: value})
-
-    return search(critical, case_at, verdict_of)
+    return search(critical, Line(make(tables, **case_keys), [critical.parameter], lower, upper))
 
 
 def bracket(answer: Search) -> tuple[float, float, float, float]:
@@ -315,6 +311,7 @@ def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undec
         assert abs(measured.rate - rate) <= measured.error + 0.1
 
 
+@pytest.mark.usefixtures("without_runs")
 @pytest.mark.parametrize(
     ("angle", "friction", "unstable"),
     [(15.0, 0.3, False), (15.0, 1.9, True), pytest.param(25.0, 0.2, False, marks=campaign)],
@@ -328,7 +325,7 @@ def test_multipliers_of_one_are_no_instability_without_dashpots(
     case = load_sweep(str(ROOT / "cases/paper/alpha-open.toml"), None).plan.case({})
     bare = changed(case, link1={"damping": 0.0}, link2={"damping": 0.0, "angle_deg": angle})
     critical = Critical(parameter="friction.coefficient", lower=0.05, upper=2.0)
-    answer = search(critical, lambda value: changed(bare, friction={"coefficient": value}), lambda case: None)
+    answer = search(critical, Line(bare, [critical.parameter], critical.lower, critical.upper))
     assert any(low < friction < high for low, high in answer.windows) is unstable
 
 

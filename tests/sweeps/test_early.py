@@ -25,7 +25,7 @@ from brakecli.solver.system import Initial, System
 from brakecli.sweeps.driver import journal_path
 from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.plan import plan_of
-from brakecli.sweeps.point import simulate
+from brakecli.sweeps.simulate import simulate
 from brakecli.sweeps.workers.task import compute_units
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts

@@ -5,12 +5,15 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakecli.branches.line import Line
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
 from tests.examples import make
 from tests.sweeps.independent import smooth_is_unstable
 from tests.sweeps.shoes import flat_critical
+
+pytestmark = pytest.mark.usefixtures("without_runs")
 
 BARE: dict[str, Any] = {  # no dashpots; near a friction of 0.3 the wave meets a natural frequency
     "shoe": {"mass": 75.84},
@@ -39,7 +42,7 @@ FAST: dict[str, Any] = {  # vibration grows by up to 469 1/s
 def found(tables: dict[str, Any], upper: float, tolerance: float) -> Search:
     """The critical friction, without runs for the least sustained value."""
     critical = Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=tolerance)
-    return search(critical, lambda value: make(tables, friction__coefficient=value), lambda case: None)
+    return search(critical, Line(make(tables), [critical.parameter], 0.0, upper))
 
 
 def test_without_dashpots_a_large_motion_beside_full_contact_hides_no_flutter() -> None:

@@ -22,7 +22,7 @@ from brakecli.solver.kernel_cache import source_hash
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.journal import open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan
-from brakecli.sweeps.point import record_type
+from brakecli.sweeps.record import record_type
 from brakecli.sweeps.workers.task import Finished, NextTask, compute_units, fingerprint
 from tests.commands import ROOT, TINY, brakecli, left_in
 from tests.sweeps.helpers import Inline, axis, frictions, inline, interrupted, quick, write_sweep

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 import tomli_w
 
+from brakecli.branches.line import Line
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
@@ -16,6 +17,8 @@ from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make
 from tests.sweeps.test_windows import assert_found, listed_ends
+
+pytestmark = pytest.mark.usefixtures("without_runs")
 
 LOST: dict[str, Any] = {  # no motion is found where vibration grows by hundreds 1/s
     "shoe": {"mass": 7.565},
@@ -87,7 +90,7 @@ BESIDE: dict[str, Any] = {  # with the step given, another motion is stable up t
 def answer(tables: dict[str, Any], upper: float) -> Search:
     """The critical friction, without runs for the least sustained value."""
     critical = Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=1e-3)
-    return search(critical, lambda value: make(tables, friction__coefficient=value), lambda case: None)
+    return search(critical, Line(make(tables), [critical.parameter], 0.0, upper))
 
 
 @campaign

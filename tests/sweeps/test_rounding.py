@@ -8,6 +8,7 @@ import pytest
 
 from brakecli.analysis.stability.certain import Rounded, conditions, links_of
 from brakecli.analysis.stability.modes import modes
+from brakecli.branches.line import Line
 from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
@@ -15,6 +16,8 @@ from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import counts
 from tests.examples import make
 from tests.sweeps.independent import Tables, held_by, mpmath, smooth_is_unstable
+
+pytestmark = pytest.mark.usefixtures("without_runs")
 
 KEYS = [
     *(
@@ -67,7 +70,7 @@ def at(tables: Tables, key: str, value: Any) -> Tables:
 
 def answer(tables: Tables, key: str, lower: float, upper: float, **more: Any) -> Search:
     critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper, **more)
-    return search(critical, lambda value: make(at(tables, key, value)), lambda case: None)
+    return search(critical, Line(make(tables), [critical.parameter], lower, upper))
 
 
 def unstable(tables: Tables) -> bool:

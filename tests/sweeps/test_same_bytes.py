@@ -10,7 +10,7 @@ from brakecli.errors import RefusedError
 from brakecli.files.read import open_result
 from brakecli.runs import limits
 from brakecli.runs.cost import Price
-from brakecli.sweeps.point import checked
+from brakecli.sweeps.simulate import checked
 from brakecli.sweeps.workers.task import compute_units
 from tests.commands import brakecli, left_in
 from tests.examples import ROUGH, make

@@ -2,6 +2,7 @@
 
 import math
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -210,21 +211,26 @@ def verdict(amplitude: float, regime: Regime = Regime.RELAXATION) -> Verdict:
     ("amplitudes", "lasts"), [((1.0, 1.005), True), ((1.0, 1.02, 1.01), True), ((1.0, 0.9, 0.8, 0.7), None)]
 )
 def test_without_a_common_period_a_vibration_lasts_that_keeps_its_amplitude(
-    amplitudes: tuple[float, ...], lasts: bool | None
+    amplitudes: tuple[float, ...], lasts: bool | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     waves = {"amplitudes": [1e-6, 1e-6], "wavelengths": [0.02, 0.02 / math.sqrt(2.0)]}
-    case, told = make(SQUEAL, roughness__wheel=waves), iter(amplitudes)
-    end = _by_runs(case, system_of(case), lambda case: verdict(next(told)))
-    assert end.lasts is lasts
-    undecided = _by_runs(case, system_of(case), lambda case: verdict(1.0, Regime.UNDECIDED))
-    damped = _by_runs(case, system_of(case), lambda case: verdict(1.0, Regime.DAMPED))
-    assert (undecided.lasts, damped.lasts) == (None, False)
+    case = make(SQUEAL, roughness__wheel=waves)
+    kept = [verdict(each) for each in amplitudes]
+    for told, expected in (
+        (kept, lasts),
+        (4 * [verdict(1.0, Regime.UNDECIDED)], None),
+        ([verdict(1.0, Regime.DAMPED)], False),
+    ):
+        runs = Mock(side_effect=told)
+        monkeypatch.setattr("brakecli.sweeps.sustained.verdict_of", runs)
+        assert _by_runs(case, system_of(case)).lasts is expected
 
 
+@pytest.mark.usefixtures("without_runs")
 def test_the_vibration_that_lasts_lowest_down_is_handed_on() -> None:
     critical = Critical(parameter="friction.coefficient", lower=0.3, upper=0.9)
     answers = Answers(explored(critical, make(SQUEAL)).explored, None)
-    answer, line = sustained(answers, 1e-2, Search(Outcome.UNSTABLE), lambda case: None), answers.line
+    answer, line = sustained(answers, 1e-2, Search(Outcome.UNSTABLE)), answers.line
     assert answer.outcome is Outcome.FOUND
     assert answer.value is not None
     assert answer.state is not None

@@ -14,8 +14,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import key_text
 from brakecli.sweeps.driver import TaskQueue
 from brakecli.sweeps.plan import LoadedSweep, Plan, parse_sweep, plan_of
-from brakecli.sweeps.point import Status, blank, line_points, next_start, record_type, simulate
+from brakecli.sweeps.point import line_points, next_start
+from brakecli.sweeps.record import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport, _hysteresis
+from brakecli.sweeps.simulate import simulate
 from brakecli.sweeps.workers.task import Task, compute_units
 from tests.commands import TINY, attributes, brakecli, left_in
 from tests.sweeps.helpers import inline

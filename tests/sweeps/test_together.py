@@ -19,7 +19,7 @@ from brakecli.solver.history import array_history
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.point import judged_together, simulate
+from brakecli.sweeps.simulate import judged_together, simulate
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import counts
 from tests.examples import ROUGH, make

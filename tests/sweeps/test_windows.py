@@ -16,6 +16,7 @@ from scipy.integrate import solve_ivp
 
 from brakecli.branches.answers import Answers
 from brakecli.branches.bar import Bound
+from brakecli.branches.line import Line
 from brakecli.branches.stable_parts import told_apart
 from brakecli.case.system import system_of
 from brakecli.sweeps.critical import search
@@ -334,7 +335,7 @@ def followed(name: str, key: str, ends: tuple[float, float]) -> Search:
     critical = Critical(
         parameter=key.replace("__", "."), lower=lower, upper=upper, tolerance=1e-3 * (upper - lower)
     )
-    return search(critical, lambda value: make(FOLDS[name], **{key: value}), lambda case: None)
+    return search(critical, Line(make(FOLDS[name]), [critical.parameter], lower, upper))
 
 
 @pytest.mark.parametrize(

@@ -59,8 +59,6 @@ def context(system: System, theory: Theory | None = None) -> Context:
     belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
-    grip = math.copysign(c.phi, belt) if belt else 0.0
-
     @cache
     def stiffness() -> float:  # in the mean, for which nodes are good enough, and thirty times cheaper
         by_nodes = system.method.own_steps and system.finds_patches
@@ -89,7 +87,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
         locks=limit if c.phi > (limit := locks_from(c, system.contact_stiffness, belt)) else None,
         touches=lambda: stiffness() > 0.0,
         settles=slowest_of_cycles(c),
-        growth=lambda: growth(c, stiffness(), grip),
+        growth=lambda: growth(c, stiffness(), c.grip(belt)),
         linear=theory,
         steadier=lambda: _steadier(system),
         ripple=lambda part, lines: ripple(system, belt, stiffness, part, lines),

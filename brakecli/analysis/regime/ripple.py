@@ -69,7 +69,7 @@ def ripple(
     forces_along(np.ascontiguousarray(y), travel, layer, finer)
     stiffness = stiffness_of()
     c, window, added = system.coefficients, np.hanning(samples), force - finer
-    grip = math.copysign(c.phi, belt)
+    grip = c.grip(belt)
     omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
     off, *seen = (np.fft.rfft((each - each.mean()) * window) for each in (added, x, v_x, force))
     (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
@@ -104,7 +104,7 @@ def detuned(
     found = np.fft.rfftfreq(len(x), part.history.interval)[1:]
     energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), found), size, len(ordered))
     held = np.minimum(_STIFFNESSES * stiffness(), system.contact_stiffness)
-    grip, omega = math.copysign(c.phi, belt), 2.0 * math.pi * ordered[:, None, None]
+    grip, omega = c.grip(belt), 2.0 * math.pi * ordered[:, None, None]
     values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, each, grip) / c.m) for each in held])
     beside = (omega / np.maximum(np.abs(1j * omega - values), 1e-9 * omega)).sum(axis=2).max(axis=1)
     change = (omega[:, 0, 0] * system.step) ** 2 * (0.25 + beside / 12.0)

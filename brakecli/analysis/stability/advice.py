@@ -19,9 +19,9 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.case.case import Case
 from brakecli.case.read import put
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError, UsageError, printable
+from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
-from brakecli.solver.steady_sliding import steady_sliding, tabulated
+from brakecli.solver.steady_sliding import sliding, tabulated
 
 KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 """What may be advised: masses, stiffnesses, dampings, angles and the load."""
@@ -101,14 +101,13 @@ class Change:
 def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
     """The answer for a case; None where the wheel stands or nothing touches it."""
     with suppress(ArithmeticError, np.linalg.LinAlgError):
-        system, rest = system_of(case), None
+        system = system_of(case)
         c, belt, k = system.coefficients, system.belt_speed, system.contact_stiffness
-        with suppress(CaseError):
-            rest = steady_sliding(system, mean=tabulated(system))
+        if rest := sliding(system, tabulated(system)):
             k = rest.stiffness if rest.is_pressed(system.load_at_start) else 0.0
         if belt != 0.0 and k > 0.0:
             critical = critical_friction(system, k, up_to)
-            return Answer(critical, growth(c, k, math.copysign(c.phi, belt)) if rest else None)
+            return Answer(critical, growth(c, k, c.grip(belt)) if rest else None)
     return None
 
 
@@ -286,9 +285,8 @@ def _is_pressed(case: Case, up_to: float) -> bool:
     if _rough(case):  # its search asks for that at every friction coefficient
         return True
     system = system_of(case)
-    with suppress(CaseError):
-        return all(steady_sliding(system, phi=phi).is_pressed(system.load_at_start) for phi in (0.0, up_to))
-    return False
+    ends = [sliding(system, phi=phi) for phi in (0.0, up_to)]
+    return all(rest is not None and rest.is_pressed(system.load_at_start) for rest in ends)
 
 
 def _rough(case: Case) -> bool:

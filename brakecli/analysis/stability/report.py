@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable
-from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache
 from itertools import pairwise
@@ -24,7 +23,7 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
-from brakecli.solver.steady_sliding import UNPRESSED, SteadySliding, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import UNPRESSED, SteadySliding, sliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
@@ -81,7 +80,7 @@ def stability(system: System) -> StabilityReport:
     found = changes(system, stiffness_at)
     critical = next((crossing for crossing in found if crossing.lost), None)
     flutter, divergence = undamped_critical(c, k, belt)
-    grip = math.copysign(c.phi, belt) if belt else 0.0
+    grip = c.grip(belt)
     values, _ = eigensystem(c, k, grip)
     fastest = float(values.real.max())
     return StabilityReport(
@@ -122,21 +121,16 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
     k = stiffness_at(c.phi)
     if not k > 0.0:
         return None
-    grows = growth(c, k, math.copysign(c.phi, system.belt_speed)) > 1e-9 * natural_frequencies(c, k)[1]
+    grows = growth(c, k, c.grip(system.belt_speed)) > 1e-9 * natural_frequencies(c, k)[1]
     return 0.0 if grows else None
 
 
 def is_stable(system: System) -> bool | None:
     """Whether steady sliding is stable at the system's own friction; None where there is none."""
     c, belt = system.coefficients, system.belt_speed
-    try:
-        rest = steady_sliding(system)
-    except CaseError:
-        return None
-    grip = math.copysign(c.phi, belt) if belt else 0.0
-    return (
-        _all_decay(c, eigensystem(c, rest.stiffness, grip)[0]) if rest.is_pressed(system.load_at_start) else None
-    )
+    rest = sliding(system)
+    pressed = rest and rest.is_pressed(system.load_at_start)
+    return _all_decay(c, eigensystem(c, rest.stiffness, c.grip(belt))[0]) if rest and pressed else None
 
 
 def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
@@ -167,10 +161,8 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
 
     @cache
     def at(phi: float) -> float:
-        with suppress(CaseError):
-            rest = steady_sliding(system, phi=phi, mean=mean)
-            return rest.stiffness if rest.is_pressed(system.load_at_start) else math.nan
-        return math.nan
+        rest = sliding(system, mean, phi)
+        return rest.stiffness if rest and rest.is_pressed(system.load_at_start) else math.nan
 
     return at
 

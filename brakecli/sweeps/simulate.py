@@ -1,0 +1,112 @@
+"""A case in memory, as a sweep runs it: until what it keeps is known, alone or beside others."""
+
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+
+from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.stability.linear import Theory, theories_of
+from brakecli.case.case import Case
+from brakecli.case.system import system_of
+from brakecli.errors import BrakecliError
+from brakecli.runs.certificate import Certificate, Certified
+from brakecli.runs.judge import asked, in_memory, motion_of
+from brakecli.runs.limits import Check, check, refuse, within_range
+from brakecli.runs.settled import Judged, settled
+from brakecli.solver.alike import at_once
+from brakecli.solver.motion import Motion
+from brakecli.solver.system import System
+from brakecli.sweeps.early import Ending, early
+from brakecli.sweeps.record import Status
+
+_UNTOLD = ("torque_variation", "settled")  # no number of a sweep, and a column of its own
+
+
+@dataclass(frozen=True)
+class PointRun:
+    """A run in memory, as far as a sweep is interested in it. `fields.POINT` says where each number is."""
+
+    verdict: Verdict
+    case: Case
+    motion: Motion | Ending
+    certificate: Certificate | None  # where the case gives no step
+    status: Status
+    reason: str
+    warning: str  # the first one
+    warning_count: int
+
+
+def simulate(case: Case, *, whole: bool = True) -> PointRun:
+    """Run a case in memory, to its end or, unless `whole`, only until what a sweep keeps is known.
+
+    Raises RefusedError, and CaseError where it has no start.
+    """
+    return judged(case, checked(case), None, whole=whole)
+
+
+def checked(case: Case) -> Check:
+    """What is known of a case before it runs; raises RefusedError where it should not."""
+    with within_range():
+        found = check(asked(system_of(case)))
+        refuse(found, timed=False)  # the same sweep gives the same bytes
+    return found
+
+
+def judged(
+    case: Case, found: Check, known: Judged[Motion] | None, theory: Theory | None = None, *, whole: bool
+) -> PointRun:
+    """The end of `simulate`, by a motion that is known already with its verdict, or by one that is computed."""
+
+    def run(part: System) -> Judged[Motion | Ending]:
+        if known and part is found.system:
+            return known
+        if not whole and (ended := early(part, theory)) is not None:
+            return ended
+        motion, certificate = motion_of(part)
+        (verdict,) = classify([in_memory(motion, part, theory)], in_full=whole)
+        return Judged(verdict, motion, certificate)
+
+    with within_range():
+        ended = settled(found.system, run)
+    verdict, motion, certificate = ended.judged
+    notes = [note for about, note in verdict.notes.items() if about not in _UNTOLD]
+    warnings, work = [*found.warnings, *ended.warnings, *notes], motion.work
+    if work.unconverged_steps and not work.failed:
+        warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
+    if certificate is not None and not certificate.certified:
+        warnings.append(f"solver.tolerance: {certificate.sentence()}")
+    status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
+    first = next(iter(warnings), "")
+    return PointRun(verdict, case, motion, certificate, status, reason, first, len(warnings))
+
+
+def judged_together(
+    systems: Sequence[System], certified: Sequence[Certified | None]
+) -> list[tuple[Judged[Motion] | None, Theory]]:
+    """The motions that are certified, with their verdicts, and all theories; None where a point has to run alone.
+
+    No number of one depends on the others, and numbers that no brake has concern none of them.
+    """
+    theories = theories_of(systems)
+
+    def verdicts(places: list[int]) -> list[Judged[Motion] | None]:
+        known = [each for i in places if (each := certified[i])]
+        try:
+            given = zip(known, places, strict=True)
+            found = classify([in_memory(each.motion, systems[i], theories[i]) for each, i in given], in_full=False)
+        except (ArithmeticError, np.linalg.LinAlgError, BrakecliError):
+            return [None] if len(places) == 1 else [each for i in places for each in verdicts([i])]
+        return [Judged(verdict, *each) for verdict, each in zip(found, known, strict=True)]
+
+    return [*zip(at_once([each and True for each in certified], verdicts), theories, strict=True)]
+
+
+def verdict_of(case: Case) -> Verdict | None:
+    """The verdict on a run in memory, as soon as it is known; None where the run fails."""
+    with suppress(BrakecliError):
+        outcome = simulate(case, whole=False)
+        return None if outcome.motion.work.failed else outcome.verdict
+    return None
