@@ -155,7 +155,8 @@ with distributed.Client({cluster.address!r}, set_as_default=False) as client:
 # workers that die
 
 
-@pytest.mark.parametrize("nanny", ["--nanny", pytest.param("--no-nanny", marks=campaign)])
+@campaign
+@pytest.mark.parametrize("nanny", ["--nanny", "--no-nanny"])
 def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path, nanny: str) -> None:
     with cluster_of(here / "dask") as cluster:
         crew = [cluster.worker(nanny), cluster.worker("--no-nanny")]
@@ -172,6 +173,7 @@ def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path, na
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
 
+@campaign
 def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(tmp_path: Path) -> None:
     """No failure is allowed: every task that a dying worker has had at the time comes back, guilty or not."""
     write_sweep(tmp_path, frictions(20))
@@ -287,6 +289,7 @@ def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(
         assert journal_size(here) == kept
 
 
+@campaign
 def test_a_scheduler_that_dies_ends_the_sweep_with_a_sentence(here: Path) -> None:
     with cluster_of(here / "dask") as cluster:
         cluster.worker("--no-nanny")

@@ -45,7 +45,7 @@ def test_no_way_of_computing_a_sweep_changes_a_byte(tmp_path: Path, name: str) -
         assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
     same()
-    for size, order in ((1, 1), (7, 1), (1000, 1), (1, -1), (7, -1)):
+    for size, order in ((1, 1), (1000, 1), (7, -1)):
         inline(loaded, tmp_path / "s.h5", compute_units, task_size=size, order=order)
         same()
     for size, order in ((1, 1), (2, -1)):  # with an interruption in the middle
