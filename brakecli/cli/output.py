@@ -38,5 +38,5 @@ def warn(*warnings: str) -> None:
 
 def announce_compilation(trouble: str) -> None:
     """Say that kernels are being compiled, and what keeps the cache from being used."""
-    say("compiling the numerical kernels, once for this version; this may take half a minute")
+    say("compiling numerical kernels, once for this version; this may take a minute or two")
     warn(*filter(None, [trouble]))

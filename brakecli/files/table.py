@@ -105,11 +105,13 @@ class TextTable:
         return list(table.T[: len(chosen)])
 
     def _index(self, wanted: str, option: str, there: str) -> int:
-        """Place of a column; a name comes before a number."""
-        if self.names.count(wanted) > 1:
+        """Place of a column; a name comes before a number, and need not have its unit in brackets."""
+        without = [re.sub(r"\s*[(\[][^()\[\]]+[)\]]$", "", name) for name in self.names]
+        names = self.names if wanted in self.names else without
+        if names.count(wanted) > 1:
             raise UsageError(f"{option}: several columns are named {wanted}; give its number, from 1")
-        if wanted in self.names:
-            return self.names.index(wanted)
+        if wanted in names:
+            return names.index(wanted)
         number = int(wanted) if wanted.isascii() and wanted.isdigit() else 0
         require(1 <= number <= self.columns, f"{option}: there is no column {wanted}; there are {there}")
         return number - 1

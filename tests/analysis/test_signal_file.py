@@ -101,6 +101,16 @@ def test_a_missing_column_is_reported_with_those_there_are(tmp_path: Path) -> No
         read(written(tmp_path, "t,x\n0,1\n1,2\n"), "force", "t")
 
 
+def test_a_column_is_found_without_its_unit_where_that_leaves_one(tmp_path: Path) -> None:
+    path = written(tmp_path, "t (ms),x (mm),x (m),t [1]\n0,1,2,3\n1,2,3,4\n2,3,4,5\n")
+    assert read(path, "x (m)", "t (ms)").values.tolist() == [2.0, 3.0, 4.0]
+    with pytest.raises(UsageError, match="several columns are named x; give its number"):
+        read(path, "x", "t (ms)")
+    path = written(tmp_path, "time (ms),x (mm)\n0,1\n1,2\n2,3\n")
+    assert read(path, "x", "time").interval == pytest.approx(1e-3)
+    assert read(path, "x", "time").values == pytest.approx([1e-3, 2e-3, 3e-3])
+
+
 def test_wrong_options_differ_from_a_wrong_file(tmp_path: Path) -> None:
     path = written(tmp_path, "a,b,c\n0,1,2\n1,2,4\n")
     with pytest.raises(UsageError, match="are not given; give --sample-rate HZ or --time-column"):

@@ -14,7 +14,7 @@ from tests.commands import TINY, Done, brakecli, each, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
-COMPILING = "brakecli: compiling the numerical kernels, once for this version; this may take half a minute\n"
+COMPILING = "brakecli: compiling numerical kernels, once for this version; this may take a minute or two\n"
 
 
 def test_the_surroundings_change_no_bit(good: Path, here: Path) -> None:
