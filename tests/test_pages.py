@@ -34,7 +34,7 @@ def prepare(folder: Path, text: str) -> None:
     wavfile.write(folder / "brake.wav", 10_000, (10_000 * tone).astype(np.int16))
     with h5py.File(folder / "recorder.h5", "w") as file:
         file["run3/position"] = 1e-6 * tone
-    given = [] if "brakecli new squeal" in text else [("new", "squeal"), ("run", "squeal.toml")]
+    given = [] if "\nbrakecli new squeal" in text else [("new", "squeal"), ("run", "squeal.toml")]
     given += [("run", "cases/relaxation.toml")] if '"relaxation.h5"' in text else []
     for line in given:
         brakecli(*line, cwd=folder).told(0)
