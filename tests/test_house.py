@@ -1,4 +1,4 @@
-"""What import-linter cannot see: arrows through the package itself, from the ground up to its face."""
+"""What linters cannot see: arrows through the package itself, and numbers that share a name."""
 
 import ast
 from collections.abc import Iterator
@@ -54,3 +54,63 @@ def test_the_face_imports_nothing_but_the_version_until_it_is_used() -> None:
     tree = ast.parse(Path(PACKAGE, "__init__.py").read_text())
     at_once = [node.module for node in tree.body if isinstance(node, ast.ImportFrom)]
     assert at_once == ["typing", "brakecli.about"]
+
+
+def is_number(node: ast.expr) -> bool:
+    """Whether an expression is made of numbers alone."""
+    parts = [part for part in ast.walk(node) if not isinstance(part, ast.operator | ast.unaryop)]
+    arithmetic = all(isinstance(part, ast.Constant | ast.BinOp | ast.UnaryOp) for part in parts)
+    return arithmetic and all(type(part.value) in (int, float) for part in parts if isinstance(part, ast.Constant))
+
+
+def holds_numbers(node: ast.expr | None) -> bool:
+    """Whether a literal holds several numbers side by side. The text keys of a dictionary are their names."""
+    match node:
+        case ast.Tuple(entries) | ast.List(entries) | ast.Set(entries):
+            return sum(map(is_number, entries)) > 1 or any(map(holds_numbers, entries))
+        case ast.Dict(keys, values):
+            named = all(isinstance(key, ast.Constant) and isinstance(key.value, str) for key in keys)
+            return (sum(map(is_number, values)) > 1 and not named) or any(map(holds_numbers, values))
+    return False
+
+
+def shared_names(text: str) -> Iterator[str]:
+    """Names at the top of a file that hold several numbers, without a type that says that all are of one kind."""
+    for node in ast.parse(text).body:
+        pairs: list[tuple[ast.expr, ast.expr | None]] = []
+        if isinstance(node, ast.AnnAssign) and "..." not in ast.unparse(node.annotation):
+            pairs = [(node.target, node.value)]
+        elif isinstance(node, ast.Assign):
+            names, values = node.targets[0], node.value
+            apart = isinstance(names, ast.Tuple) and isinstance(values, ast.Tuple)
+            pairs = [*zip(names.elts, values.elts, strict=True)] if apart else [(names, values)]  # type: ignore[attr-defined]
+        yield from (name.id for name, value in pairs if isinstance(name, ast.Name) and holds_numbers(value))
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("KICKED = 0.5, 0.1", ["KICKED"]),
+        ("KICKED = [1 / 2, -0.1]", ["KICKED"]),
+        ("KICKED: tuple[float, float] = 0.5, 0.1", ["KICKED"]),
+        ("KICKED, LATE = (0.5, 0.1), 3.0", ["KICKED"]),
+        ("KICKED = {1: 0.5, 2: 0.1}", ["KICKED"]),
+        ("KICKED = (('sizes', 0.5, 0.1),)", ["KICKED"]),
+        ("SIZE_OFF, FREQUENCY_OFF = 0.5, 0.1", []),
+        ("MOST = {'newton': 100, 'fixed-point': 500}", []),
+        ("LADDER: tuple[float, ...] = 0.5, 0.1", []),
+        ("LADDER = Ladder(0.5, 0.1)", []),
+        ("NAMES = 'one', 'two'", []),
+    ],
+)
+def test_numbers_under_one_name_are_seen(text: str, found: list[str]) -> None:
+    assert [*shared_names(text)] == found
+
+
+def test_every_number_has_a_name_of_its_own() -> None:
+    found = {
+        str(path.relative_to(PACKAGE)): names
+        for path in PACKAGE.rglob("*.py")
+        if (names := [*shared_names(path.read_text())])
+    }
+    assert not found

@@ -18,6 +18,8 @@ from brakecli.branches.told import FORCED, SLIDING, Followed, Mark
 
 MEET = 1e-3
 """Part of the range, and of their states, by which two ends of branches differ at most that are one motion."""
+SAME = 1e-9
+"""Distance of two places of the range that are one, but for rounding."""
 NONE_BEGINS = "no vibration begins in the range; --start follows one that a run has come to"
 
 
@@ -252,7 +254,7 @@ class Answers:
         low, _, frequency = self.coexisting[0]
         until = max(end for _, end, _ in self.coexisting)
         begin, end = (f"{self.line.value(p):.4g}" for p in (low, until))
-        reaches = any(abs(until - edge) < 1e-9 for edge in (1.0, *(low.p for low, _ in self.windows)))
+        reaches = any(abs(until - edge) < SAME for edge in (1.0, *(low.p for low, _ in self.windows)))
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
         what = "the motion that the waves force" if self.bases else "stable sliding"
         return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]

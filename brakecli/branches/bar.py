@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli.branches.follow import both_ways
-from brakecli.branches.newton import Newton, Settings
+from brakecli.branches.newton import Newton, Settings, zero
 from brakecli.branches.point import Point
 
 FINER = 1.5
@@ -17,7 +17,7 @@ LEFT_OPEN = 4.0
 change, but kinks of the contact force let it fall unevenly: as patches open, and where a whole pad lands."""
 KNOWN = 1e-6
 """Least bar, in parts of the range, where steps are taken: multipliers are checked to so much."""
-STRIDES = 0.0, 1e-4, 1e-3, 1e-2, 5e-2
+STRIDES: tuple[float, ...] = 0.0, 1e-4, 1e-3, 1e-2, 5e-2
 """Lengths by which two motions beside an end are moved apart until finer steps find it between them."""
 AROUND = Settings(points=60)
 """How far a branch is followed with finer steps where these lengths do not hold its end."""
@@ -25,6 +25,8 @@ ROUNDS = 24
 """Motions that are computed to locate an end between two others."""
 LOCATED = 1e-7
 """Change of p below which it is located."""
+NOT_ZERO = 1e-12
+"""Least size of a logarithm of a multiplier, so that it has the sign that the verdict on stability has."""
 WIDEST = 1.0 / 3.0
 """Part of the range that an error bar with an answer may have."""
 
@@ -79,7 +81,7 @@ def located(newton: Newton, one: Point, other: Point) -> float:
     """
     low, high, p, side = _outside(one), _outside(other), one.p, 0
     for turn in range(ROUNDS):
-        part = 0.5 if turn % 2 else min(max(low / (low - high), 0.02), 0.98)
+        part = 0.5 if turn % 2 else zero(low, high)
         middle = newton.between(one, other, part) or newton.between(one, other, 0.5)
         if middle is None:
             break
@@ -96,4 +98,4 @@ def located(newton: Newton, one: Point, other: Point) -> float:
 def _outside(point: Point) -> float:
     """ln of the largest multiplier, which is negative where a motion is stable."""
     size = math.log(max(float(np.abs(point.multipliers).max()), 1e-300))
-    return min(size, -1e-12) if point.stable else max(size, 1e-12)
+    return min(size, -NOT_ZERO) if point.stable else max(size, NOT_ZERO)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from brakecli.branches.newton import Newton
+from brakecli.branches.newton import Newton, zero
 from brakecli.branches.point import End, Point
 
 LEAST_LOOP = 8
@@ -12,6 +12,12 @@ LEAST_LOOP = 8
 RECENT = 20
 """Points among which one is sought over which the branch runs back."""
 TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
+REACH = 10.0
+"""Strides with which a border is crossed, within which a branch that runs back over itself meets a point again."""
+PASSES = 4.0
+"""Strides from the first point, beyond which a branch that crosses its plane passes elsewhere; a choice."""
+NARROWED = 7
+"""Points that bracket the crossing. A choice: what is wider then is compared all the same."""
 SHARP = 0.7
 """Cosine of the angle by which a branch turns at a sharp corner."""
 SAME_PLACE = 1e-7
@@ -30,7 +36,7 @@ def turned_back(points: list[Point], new: Point, border: float) -> bool:
     """Whether the branch has come back across a border and runs back over itself."""
     if new.word == points[-1].word:
         return False
-    reach = 10.0 * border
+    reach = REACH * border
     for point in points[: -1 - RECENT : -1]:
         if point.chart is new.chart and point.word == new.word:
             chord = new.z - point.z
@@ -79,12 +85,12 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
         return None, None
     if not foreign:
         away = here.z - first.z
-        if math.sqrt(away @ away) > 4.0 * (new.s - here.s):
+        if math.sqrt(away @ away) > PASSES * (new.s - here.s):
             return None, None
     one, other = here, new
-    for _ in range(7):
+    for _ in range(NARROWED):
         low, high = ahead(one), ahead(other)
-        middle = newton.between(one, other, min(max(low / (low - high), 0.02), 0.98) if low != high else 0.5)
+        middle = newton.between(one, other, zero(low, high))
         if middle is None or middle.word != here.word:
             return None, None
         if ahead(middle) == 0.0 or other.s - one.s < BRACKETED:

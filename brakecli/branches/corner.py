@@ -8,8 +8,10 @@ import numpy as np
 from brakecli.branches.newton import Newton
 from brakecli.branches.point import Point
 
-REACHES = 1e-5, 1e-4, 1e-3, 5e-3
+REACHES: tuple[float, ...] = 1e-5, 1e-4, 1e-3, 5e-3
 """Distances beyond a border at which the other side is looked at."""
+TRIED: tuple[float, ...] = 0.1, 1.0, 10.0
+"""Times that distance, at which a point of the other side is sought."""
 FAR = 5.0
 """Times the length of a stride beyond a border, from which on a point belongs to another branch."""
 
@@ -30,7 +32,7 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
             if not np.isfinite(rows).all():
                 break
             onward = np.linalg.svd(rows)[2][-1]
-            for length in (0.1 * reach, reach, 10.0 * reach):
+            for length in (part * reach for part in TRIED):
                 for way in (onward, -onward):
                     # Newton's method begins beyond the border: from this side it would find this side again
                     guess = place + (length - (place - here.z) @ way) * way

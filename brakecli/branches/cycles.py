@@ -15,7 +15,7 @@ import numpy as np
 
 from brakecli.branches.line import Line
 from brakecli.branches.point import Point
-from brakecli.branches.problem import Array, Guess, Problem, Seen
+from brakecli.branches.problem import Array, Guess, Problem, Seen, steps_in_p
 from brakecli.errors import CaseError
 from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.flow.repeating import Orbit
@@ -36,6 +36,11 @@ SHIFT = 1e-6
 """Length along the branch by which a point is moved to carry its direction to another chart."""
 INSTANT = 1e-12
 """Part of the period that a flow takes at least: it has no step of no length."""
+BEGUN = 1e-9
+"""Part of the period in which the direction of the flow is found at a state: nothing turns within it."""
+LOOKED, CORRECTED = 256, 8
+"""Places of a cycle at which it is compared with another chart, and corrections of the nearest by Newton's
+method. Choices."""
 SHORTEST, LONGEST = 1e-3, 400.0
 """Periods of a chart between which a period is sought."""
 
@@ -166,7 +171,7 @@ class Cycles(Problem):
     def _by_p(self, u: Array, p: float, end: Array, word: tuple[int, ...]) -> Array | None:
         """The derivative of the gap by p, of the same sequence of events: central, or else to one side."""
         sides = {}
-        for step in (DIFFERENCE, -DIFFERENCE, 0.03 * DIFFERENCE, -0.03 * DIFFERENCE):
+        for step in steps_in_p(DIFFERENCE):
             if not 0.0 <= p + step <= 1.0:
                 continue
             flow = self._flown(u, p + step, self.chart, derivative=False)
@@ -204,7 +209,7 @@ class Cycles(Problem):
     def _along(self, u: Array, p: float, scales: Array, time: float) -> Array | None:
         """The direction of the flow at a place, of length one; None where nothing moves there."""
         flow = self.flow(p)
-        flow(self.rest(p) + u[:4] * scales, 1e-9 * time, False)
+        flow(self.rest(p) + u[:4] * scales, BEGUN * time, False)
         speed = flow.path.start / scales
         length = math.sqrt(speed @ speed)
         return speed / length if length > 0.0 else None
@@ -255,13 +260,13 @@ class Cycles(Problem):
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
         cycle, flow, rest = point.facts, self.flow(point.p), self.rest(point.p)
         state, best = np.array(cycle.state), (math.inf, 0.0)
-        for part in np.linspace(0.0, 1.0, 257)[:-1]:
+        for part in np.linspace(0.0, 1.0, LOOKED + 1)[:-1]:
             if flow(state, max(part, INSTANT) * cycle.period, False) != DONE:
                 return None
             off = (flow.state - rest) / chart.scales - chart.place
             best = min(best, (float(off @ off), float(part)))
         ahead = best[1] * cycle.period
-        for _ in range(8):  # Newton's method for the time at which the plane is passed
+        for _ in range(CORRECTED):  # Newton's method for the time at which the plane is passed
             if flow(state, max(ahead % cycle.period, INSTANT * cycle.period), False) != DONE:
                 return None
             off, speed = (flow.state - rest) / chart.scales - chart.place, flow.path.velocity / chart.scales

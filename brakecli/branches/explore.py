@@ -14,7 +14,7 @@ from brakecli.analysis.stability.modes import is_undamped
 from brakecli.branches.begin import settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.follow import Stop, both_ways, follow
-from brakecli.branches.forced import Forced
+from brakecli.branches.forced import MOST_PERIODS, Forced
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Point
@@ -35,7 +35,9 @@ LONGEST = 0.25
 """Longest stride, in sizes of the motion and of the range."""
 POINTS, ALL_POINTS, SECONDS = 3000, 10_000, 60.0
 """Budgets: of points of one branch and of all of them, and of time."""
-GROWN_AT = 0.0, 1.0, 0.5, 0.25, 0.75
+GROWING_POINTS = 300
+"""Budget of points in which the waves grow to their size; a choice."""
+GROWN_AT: tuple[float, ...] = 0.0, 1.0, 0.5, 0.25, 0.75
 """Places of the line at which a forced motion is sought that grows with the waves, where none is known yet."""
 SAME = 1e-6
 """Relative difference of amplitude and period by which two motions at one value are the same."""
@@ -179,7 +181,7 @@ class Explorer:
         for p in GROWN_AT:
             if self._over() or any(low <= p <= high for low, high in map(span, self.branches[1:])):
                 continue
-            first = problem.begun(p, replace(self._settings(), points=300))
+            first = problem.begun(p, replace(self._settings(), points=GROWING_POINTS))
             if first is not None:
                 self._follow(problem, first, FORCED, within=True)
         if len(self.branches) == 1 and not self.stop():
@@ -202,7 +204,7 @@ class Explorer:
             for point in crossing(followed, p):
                 one, other = point.facts, first.facts
                 if math.isclose(one.amplitude, other.amplitude, rel_tol=SAME) and any(
-                    math.isclose(k * one.period, other.period, rel_tol=SAME) for k in (1, 2, 3, 4)
+                    math.isclose(k * one.period, other.period, rel_tol=SAME) for k in range(1, MOST_PERIODS + 1)
                 ):
                     return True
         return False

@@ -9,10 +9,10 @@ import numpy as np
 
 from brakecli.branches.closing import LEAST_LOOP, SHARP, TURNED_BACK, closing, passed, turned_back
 from brakecli.branches.corner import beyond_corner, led_on
-from brakecli.branches.newton import Newton, Settings
+from brakecli.branches.newton import FROM_AFAR, LEFT, OFF, Newton, Settings
 from brakecli.branches.point import Branch, End, Point, Special
 from brakecli.branches.problem import Array, Problem
-from brakecli.branches.signs import special_points
+from brakecli.branches.signs import GRID, special_points
 
 Until = Callable[[Point], str | None]
 """Called with each point; a reason ends the branch there."""
@@ -34,19 +34,23 @@ class Strides:
     aim_again: float = 0.8  # what is aimed at then
     at_border: float = 0.5  # the same of a stride that ends beyond a border, whose sharp turn is not seen
     fine: float = 30.0  # shortest strides below which one is repeated only for turns that are `repeated` as well
+    failed: float = 0.5  # part of a stride with which one is repeated that has failed
+    from_border: float = 0.25  # the same of one that a border has cut, so that few are taken up to it
+    bent: float = 0.5  # rad, turn in a stride up to which a cubic predicts it
+    foretold: float = 4.0  # lengths of the last stride, up to which it does so
     large: float = 0.2  # part of a large coefficient by which changes of it are counted
 
 
 STRIDES = Strides()
-LEFT, ROUNDING = 0.5, 1e-7
-"""Part of a stride by which a point may lie off its guess, beyond which it is of another branch; and rounding."""
+SAME_P = 1e-6
+"""Change of p by a new chart, beyond which another motion was found."""
 VERTICAL = 1e-9
 """Slope dp/ds below which a tangent is vertical."""
 
 
 def _left(off: Array, length: float) -> bool:
     """Whether a point so far off its guess has left the branch in a stride of this length."""
-    return math.sqrt(off @ off) > LEFT * length + ROUNDING
+    return math.sqrt(off @ off) > LEFT * length + OFF
 
 
 def follow(
@@ -133,7 +137,7 @@ class _Walk:
             if new is None:
                 seen = self.newton.seen
                 beyond = seen is not None and seen.word != here.word
-                before, stride = stride, stride * (0.25 if beyond else 0.5)
+                before, stride = stride, stride * (STRIDES.from_border if beyond else STRIDES.failed)
                 # a corner is tried as soon as the border is near, and at last in any case
                 if stride >= settings.shortest and not (beyond and stride < settings.border <= before):
                     continue
@@ -216,7 +220,7 @@ class _Walk:
             way = here.s - back.s
             if way > 0.0 and back.chart is here.chart and back.word == here.word:
                 bend = here.tangent - back.tangent  # the curvature, times the way
-                if math.sqrt(bend @ bend) * stride < 0.5 * way and stride < 4.0 * way:
+                if math.sqrt(bend @ bend) * stride < STRIDES.bent * way and stride < STRIDES.foretold * way:
                     x = stride / way
                     second = back.z - here.z + way * here.tangent
                     third = 2.0 * second - way * bend
@@ -250,7 +254,7 @@ class _Walk:
         """The end point where the branch leaves the range, and turns outside of it, between two points inside."""
         if here.tangent[-1] * new.tangent[-1] >= 0.0 or here.word != new.word:
             return None
-        t = np.linspace(0.0, 1.0, 17)
+        t = GRID
         rise, way = new.p - here.p, new.s - here.s
         cubic = here.p + (3.0 * t**2 - 2.0 * t**3) * rise
         cubic += t * (1.0 - t) * way * ((1.0 - t) * here.tangent[-1] - t * new.tangent[-1])
@@ -289,8 +293,8 @@ class _Walk:
             return None
         u, direction = guess
         onward = direction / math.sqrt(direction @ direction)
-        new = self.newton.solved(np.append(u, point.p), onward, onward, point.s, exact=True, most=15)
-        if new is None or abs(new.p - point.p) > 1e-6:
+        new = self.newton.solved(np.append(u, point.p), onward, onward, point.s, exact=True, most=FROM_AFAR)
+        if new is None or abs(new.p - point.p) > SAME_P:
             self.problem.use(point.chart)
             return None
         return new

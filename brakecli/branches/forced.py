@@ -21,7 +21,7 @@ from brakecli.branches.frame import NO_PERIOD, Frame, frame_of, resting
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Settings, start
 from brakecli.branches.point import Point
-from brakecli.branches.problem import Array, Doubled, Guess, Problem, Seen
+from brakecli.branches.problem import Array, Doubled, Guess, Problem, Seen, steps_in_p
 from brakecli.errors import CaseError
 from brakecli.solver.automaton import STICK
 from brakecli.solver.flow.repeating import Orbit
@@ -39,6 +39,8 @@ SNAP = 1e-6
 A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
 FIRST_WAVES = 1e-3
 """Part of the amplitude of the waves with which a motion begins that grows with them."""
+MOST_PERIODS = 4
+"""Common periods in which a motion is sought that repeats; a choice, as flips double them."""
 WAITED = 50
 """Periods for which a run goes on before a motion is sought at its end."""
 AT_REPEAT = 0.1
@@ -179,8 +181,7 @@ class Forced(Doubled):
 
     def _by_p(self, u: Array, p: float, found: _Flown) -> Array | None:
         """The derivative of the gaps by p, of the same sequence of phases, to the first side that has it."""
-        inward = DIFFERENCE if p < 0.5 else -DIFFERENCE
-        for step in (inward, -inward, 0.03 * inward, -0.03 * inward):
+        for step in steps_in_p(DIFFERENCE if p < 0.5 else -DIFFERENCE):
             if not 0.0 <= p + step <= 1.0:
                 continue
             beside = self._flown(u, p + step, derivative=False)
@@ -238,7 +239,7 @@ class Forced(Doubled):
         return start(self, last.u, p) if last.p == 1.0 else None
 
     def settled(
-        self, p: float, state: Array, most: int = 4, waited: int = WAITED
+        self, p: float, state: Array, most: int = MOST_PERIODS, waited: int = WAITED
     ) -> "tuple[Forced, Point] | None":
         """The motion that a run from a state (x, y, v_x, v_y) at t = 0 comes to, and the problem of its periods.
 

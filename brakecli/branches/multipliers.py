@@ -17,6 +17,12 @@ UNKNOWN = 1e-6
 """Beyond this error of small multipliers beside a huge one, the signs of the tests are checked against it."""
 STABLE = 1e-10
 """Distance from the unit circle below which a multiplier is not called stable."""
+POWERS = 600.0
+"""Largest logarithm by which a scaled product is multiplied, so that it stays a number."""
+SCALED = 1e3
+"""Size beyond which, or below the inverse of which, a product is scaled; a choice, as scaling takes time."""
+SURE = 10.0
+"""Times its error that a factor must have for its sign to count."""
 LARGE = 300.0
 """Logarithm beyond which asinh is taken from the logarithm, as the number itself may overflow."""
 
@@ -47,7 +53,7 @@ def product(maps: Array) -> tuple[Array, float]:
         if k:
             total = maps[k] @ total
         size = float(np.abs(total).max())
-        if 1e-300 < size < math.inf and not 1e-3 < size < 1e3:
+        if 1e-300 < size < math.inf and not 1.0 / SCALED < size < SCALED:
             total, log = total / size, log + math.log(size)
     return total, log
 
@@ -60,7 +66,7 @@ def spectrum(maps: Array) -> Spectrum:
     """
     total, log = product(maps)
     scaled = sorted(np.linalg.eigvals(total).tolist(), key=abs, reverse=True)
-    scale = math.exp(min(log, 600.0))
+    scale = math.exp(min(log, POWERS))
     values = [complex(value * scale) for value in scaled]
     error = ROUNDING * max(abs(values[0]), scale * float(np.abs(total).max()))
     pairs = [(a, b) for i, a in enumerate(values) for b in values[i + 1 :]]
@@ -88,7 +94,7 @@ def _asinh(factors: Iterable[tuple[complex, float]], error: float) -> float:
     log, phase = 0.0, 1.0 + 0.0j
     for factor, bound in factors:
         size = abs(factor)
-        if error > UNKNOWN and size < 10.0 * bound:
+        if error > UNKNOWN and size < SURE * bound:
             return math.nan
         if size == 0.0:
             return 0.0

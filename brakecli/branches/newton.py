@@ -10,7 +10,19 @@ from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Problem, Seen
 
 ROUNDING = 1e-9
-"""Gap that may grow from one correction to the next."""
+"""Gap that may grow from one correction to the next, and part of the range by which p may leave it."""
+GROWS = 4.0
+"""Times by which a gap may grow from one correction to the next; a choice, as the first ones may overshoot."""
+STALLS = 0.3
+"""Size of a correction over the one before, beyond which rounding keeps it from becoming smaller."""
+FROM_AFAR = 15
+"""Evaluations for a point that no neighbour on its branch predicts."""
+LEFT, OFF = 0.5, 1e-7
+"""A point has left its branch that lies farther off its guess than this part of a stride, and this length."""
+SHORT = 1e-6
+"""Chord whose direction is mostly rounding."""
+AT_ENDS = 0.02
+"""Part of a bracket that is left at its ends, so that one near a zero is narrowed from both sides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +115,7 @@ class Newton:
         z, last, before, lever = guess.copy(), math.inf, math.inf, 1.0
         by_p, word, taken = None, None, z
         near = settings.exact if exact else settings.near
-        slack = 1e-9 * (settings.high - settings.low)
+        slack = ROUNDING * (settings.high - settings.low)
         for _ in range(most or settings.iterations):
             if not settings.low - slack <= z[n] <= settings.high + slack:
                 self.outside, self.why = z, "the parameter leaves its range"
@@ -116,7 +128,7 @@ class Newton:
             if seen.by_p is not None:
                 by_p, word, taken = seen.by_p, seen.word, z
             gap = float(np.abs(seen.gap).max())
-            if not gap <= 4.0 * last + ROUNDING:
+            if not gap <= GROWS * last + ROUNDING:
                 break
             last = gap
             matrix[:n, :n], matrix[:n, n] = seen.by_u, by_p
@@ -126,7 +138,7 @@ class Newton:
             if not size <= settings.trust or not length < math.inf:
                 break
             # rounding of the gap may keep corrections from becoming still smaller
-            stalled = size <= settings.near and size > 0.3 * before
+            stalled = size <= settings.near and size > STALLS * before
             before = size
             # where two branches almost meet, a small gap asks for a long step, and the tangent turns as quickly
             lever = max(lever, size / gap if gap > ROUNDING else 0.0)
@@ -212,14 +224,19 @@ class Newton:
         else:
             onward, guess = chord, one.z + t * chord
         # the direction of a very short chord is mostly rounding
-        normal = chord / length if length > 1e-6 else one.tangent
+        normal = chord / length if length > SHORT else one.tangent
         found = self.solved(guess, normal, onward, one.s + t * way, exact=True)
         if found is not None:
             off = found.z - guess
-            if off @ off > 0.25 * length * length + 1e-14:
+            if off @ off > (LEFT * length) ** 2 + OFF**2:
                 self.why = "another branch lies beside this one"
                 return None
         return found
+
+
+def zero(low: float, high: float, at_ends: float = AT_ENDS) -> float:
+    """Part of the way from one value to another at which a straight line is zero, but not at the very ends."""
+    return min(max(low / (low - high), at_ends), 1.0 - at_ends) if low != high else 0.5
 
 
 def start(
@@ -231,4 +248,4 @@ def start(
     normal[-1] = 1.0
     if onward is not None:
         normal = np.asarray(onward, float) / np.linalg.norm(onward)
-    return newton.solved(np.append(u, p), normal, normal, 0.0, exact=True, most=15)
+    return newton.solved(np.append(u, p), normal, normal, 0.0, exact=True, most=FROM_AFAR)

@@ -38,8 +38,17 @@ class Seen(NamedTuple):
     """
 
 
+NEARER = 0.03
+"""Part of a step in p with which a derivative is tried again where the step meets another sequence of events; a
+choice."""
+
 Guess = tuple[Array, Array]
 """Unknowns, and a direction (n + 1,) of the unknowns and the parameter, of any length."""
+
+
+def steps_in_p(first: float) -> tuple[float, ...]:
+    """Steps in p by which a derivative is tried, to both sides."""
+    return first, -first, NEARER * first, -NEARER * first
 
 
 class Problem(Protocol):

@@ -7,9 +7,10 @@ from itertools import pairwise
 import numpy as np
 
 from brakecli.branches.multipliers import resonant_pair
-from brakecli.branches.newton import Newton
+from brakecli.branches.newton import Newton, zero
 from brakecli.branches.point import FLIP, FOLD, TORUS, TURN, End, Point, Special
 from brakecli.branches.problem import Array
+from brakecli.solver.tangent import MOST_POWERS
 
 Over = Callable[[], End | None]
 """Why nothing more may be computed, if so."""
@@ -24,6 +25,16 @@ ROUNDING = 1e-11
 """Least error of a located p."""
 NOTHING = 1e-9
 """A test that is smaller at both ends of a stride vanishes identically, as in area-preserving maps."""
+AT_END = 1e-7
+"""Part of a stride beside its ends in which no zero is sought: Newton's method would find the ends again."""
+ASIDE = 0.1
+"""Part of a stride by which a point is moved from where Newton's method fails, or from the ends; a choice."""
+LEFT_OPEN = 0.6
+"""Doubt of a straight line between two points, over their difference: a little more than half of it."""
+TRIES, SHORTER = 4, 0.25
+"""Strides from one side of a border that are tried, and each over the one before."""
+REAL = 1e-9
+"""Imaginary part of a multiplier, over its size, that is rounding."""
 ONE_PLACE = 1e-4
 """Length over which a turn and a branch point are the same, as on the outer branch of a pitchfork."""
 GRID = np.linspace(0.0, 1.0, 17)
@@ -139,11 +150,11 @@ def _ordered(near: Point, middle: Point, far: Point) -> bool:
 def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | None:
     """A point between two of different words, on the side of one of them."""
     stride = 0.5 * (far.s - near.s) * (1.0 if base is near else -1.0)
-    for _ in range(4):
+    for _ in range(TRIES):
         found = newton.solved(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
         if found is not None and found.word == base.word:
             return found
-        stride *= 0.25
+        stride *= SHORTER
     return None
 
 
@@ -225,7 +236,7 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     elif size == 3:
         error = np.abs(top) * np.abs(weight)[:, :, None]
     else:
-        error = 0.6 * np.abs(last - first)[:, None, :] * np.ones_like(model)
+        error = LEFT_OPEN * np.abs(last - first)[:, None, :] * np.ones_like(model)
     side = np.where(first >= 0.0, 1.0, -1.0)[:, None, :]
     floor = side * model - error
     inner = floor[:, 1:-1]
@@ -244,7 +255,7 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     found = []
     for k in np.flatnonzero(suspect.any(axis=1)).tolist():
         test = int(np.flatnonzero(suspect[k])[0])
-        found.append((k, min(max(float(place[k, test]), 0.1), 0.9)))
+        found.append((k, min(max(float(place[k, test]), ASIDE), 1.0 - ASIDE)))
     return found
 
 
@@ -274,13 +285,13 @@ def _differ(one: Point, other: Point, test: int) -> bool:
 
 def _determinant(point: Point, top: float) -> float:
     sign, log = point.orientation
-    return sign * math.exp(max(log - top, -700.0))
+    return sign * math.exp(max(log - top, -MOST_POWERS))
 
 
 def _saddle(point: Point) -> bool:
     """Whether the pair with a product near one is real: a neutral saddle, at which no torus is born."""
     pair = resonant_pair(point.multipliers)
-    return pair is None or abs(pair[0].imag) <= 1e-9 * abs(pair[0])
+    return pair is None or abs(pair[0].imag) <= REAL * abs(pair[0])
 
 
 def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable[[Point], float]) -> Special:
@@ -288,9 +299,9 @@ def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable
     low, high = test(one), test(other)
     best, error, side = one, abs(other.p - one.p), 0
     for _ in range(MOST_STEPS):
-        part = min(max(low / (low - high), 1e-7), 1.0 - 1e-7)
+        part = zero(low, high, AT_END)
         # Newton's method fails very near a branch point: then a little before it, or behind it
-        for place in (part, 0.9 * part, 0.1 + 0.9 * part):
+        for place in (part, (1.0 - ASIDE) * part, ASIDE + (1.0 - ASIDE) * part):
             new = newton.between(one, other, place)
             if new is not None:
                 break

@@ -4,19 +4,19 @@ import math
 
 import numpy as np
 
-from brakecli.branches.multipliers import product
-from brakecli.branches.newton import Newton, Settings
+from brakecli.branches.multipliers import POWERS, product
+from brakecli.branches.newton import FROM_AFAR, LEFT, Newton, Settings
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Doubled
 
-DISTANCES = 1e-2, 3e-3, 1e-3, 3e-4
+DISTANCES: tuple[float, ...] = 1e-2, 3e-3, 1e-3, 3e-4
 """Distances from the flip at which the doubled motion is sought."""
 
 
 def flipped(point: Point) -> Array:
     """The eigenvector (d,) of the multiplier nearest to -1, of length one."""
     total, log = product(point.maps)
-    values, vectors = np.linalg.eig(total * math.exp(min(log, 600.0)))
+    values, vectors = np.linalg.eig(total * math.exp(min(log, POWERS)))
     vector = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
     return np.asarray(vector / np.linalg.norm(vector))
 
@@ -32,9 +32,9 @@ def switch(problem: Doubled, point: Point, settings: Settings | None = None) -> 
     newton = Newton(problem, settings or Settings())
     flip = np.append(u, point.p)
     for distance in DISTANCES:
-        new = newton.solved(flip + distance * onward, onward, onward, 0.0, exact=True, most=15)
+        new = newton.solved(flip + distance * onward, onward, onward, 0.0, exact=True, most=FROM_AFAR)
         if new is not None:
             off = new.z - flip - distance * onward
-            if math.sqrt(off @ off) < 0.5 * distance:
+            if math.sqrt(off @ off) < LEFT * distance:
                 return new
     return None

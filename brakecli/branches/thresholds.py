@@ -18,7 +18,8 @@ below it: the range reaches as far above the critical friction as there is room 
 through to there (`make bench-branch`)."""
 BEYOND = 1.05
 """The same, in the friction of the case, where that lies higher and sliding is stable there again."""
-
+REACHES = 1e-6
+"""Distance from an edge, over the range, at which a window ends at that edge."""
 POINTS = 500
 """Motions of a branch. Nine branches of ten need fewer; a thousand may take most of a minute if cycles are long.
 It is a count and not a time, so that the same case gives the same answer."""
@@ -94,7 +95,7 @@ def _beside(answers: Answers, critical: float) -> str:
         return "the vibration that begins there does not exist below it"
     low, high = (line.value(p) for p in (coexisting[0][0], max(end for _, end, _ in coexisting)))
     edges = [line.high, critical, *answers.critical_windows_lower]
-    reaches = any(abs(high - edge) <= 1e-6 * line.high for edge in edges)
+    reaches = any(abs(high - edge) <= REACHES * line.high for edge in edges)
     until = "on" if reaches else f"to {high:.4g}{' at least' if cut else ''}"
     words = f"a vibration can exist from {low:.4g} {until}"
     if answers.barrier is not None:

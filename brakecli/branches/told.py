@@ -10,9 +10,12 @@ import numpy as np
 from brakecli.branches.line import Line
 from brakecli.branches.point import Branch, End, Point, Special
 from brakecli.branches.sliding import Change, Slide
+from brakecli.solver.tangent import MOST_POWERS
 
 SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
 IN_SLIDING = "it ends in steady sliding, where that flutters"
+BESIDE = 1e-5
+"""Length along a branch from its begin, within which a special point is that begin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,9 +68,8 @@ def slid(line: Line, slides: list[Slide], changes: list[Change]) -> Followed:
         assert slide.eigenvalues is not None
         fastest = slide.eigenvalues[int(np.argmax(slide.eigenvalues.real))]
         frequency = abs(float(fastest.imag)) / (2.0 * math.pi)
-        factors = np.exp(np.clip((slide.eigenvalues / (frequency or 1.0)).real, -700.0, 700.0)) * np.exp(
-            1j * (slide.eigenvalues / (frequency or 1.0)).imag
-        )
+        turned = slide.eigenvalues / (frequency or 1.0)
+        factors = np.exp(np.clip(turned.real, -MOST_POWERS, MOST_POWERS)) * np.exp(1j * turned.imag)
         rows.append(Row(line.value(slide.p), 0.0, frequency, 0.0, 0.0, slide.stable, tuple(factors.tolist())))
     for change in changes:
         width = abs(line.high - line.low)
@@ -96,7 +98,7 @@ def told_of(
         if line.smooth:
             first = next((k for k, point in enumerate(points) if len(set(point.facts.word)) > 1), len(points))
         points = points[max(first - 1, 0) :]
-        beyond = points[0].s + 1e-5 if line.smooth else 0.0
+        beyond = points[0].s + BESIDE if line.smooth else 0.0
         specials = [special for special in specials if special.s > beyond or special.kind == "end"]
         marks.append(_mark(line, Special("flutter", change.p, change.error, points[0], points[0].s)))
     for special in specials:

@@ -13,13 +13,15 @@ from pydantic import Field
 from brakecli.case import tables
 from brakecli.case.parts import SETTLED, Contact, Friction, Initial, Link, Load, Output, Shoe, Solver, Wheel
 from brakecli.case.roughness import NEEDLESS, Roughness, record_of, surface_of
-from brakecli.case.tables import Table, described
+from brakecli.case.tables import ROUNDED, Table, described
 from brakecli.errors import BrakecliError, Problem
 from brakecli.solver.contact import EVALUATORS
 
 if TYPE_CHECKING:
     from brakecli.solver.records import Coefficients
 
+PROFILE_ERROR = 0.01
+"""Part of the RMS of a measured profile that its sines leave out, where a case leaves it open."""
 SAMPLES_PER_CYCLE, SAMPLES_PER_WAVE = 50.0, 10.0
 """Samples in a period of the fastest motion, and of the shortest wave that passes, where a case leaves it open."""
 
@@ -70,7 +72,7 @@ class Case(Table):
             from brakecli.case.profile import sines_of
 
             pad = self.contact.half_length if side == "shoe" else None
-            error = 0.01 if given.profile_error is None else given.profile_error
+            error = PROFILE_ERROR if given.profile_error is None else given.profile_error
             try:
                 path, record = Path(given.profile), record_of(given.profile)
                 sines = dict(type(given)(**sines_of(path.name, record, error, self.wheel.radius, pad)))
@@ -106,7 +108,7 @@ class Case(Table):
         changing = [key for key, each in values.items() if len({*(each or ())}) > 1]
         yield from self.broken(
             (
-                step is not None and self.output.sample_interval < step * (1 - 1e-9),
+                step is not None and self.output.sample_interval < step * (1 - ROUNDED),
                 "output.sample_interval",
                 f"is below the time step of {step!r} s",
                 "make it at least one time step",

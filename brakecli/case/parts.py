@@ -10,7 +10,7 @@ from brakecli.case import tables
 from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
 from brakecli.errors import Problem, found
 from brakecli.solver.contact import EVALUATORS
-from brakecli.solver.method import MOST
+from brakecli.solver.method import MOST_EVALUATIONS
 from brakecli.solver.schemes import SCHEMES, Scheme
 
 DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
@@ -147,7 +147,7 @@ class Solver(Table):
         "three that add up to 1 for three-layer, 0.25, 0.5 and 0.25 if left out; none for others",
         default_factory=tuple,
     )
-    iteration: Annotated[str, *one_of(lambda: MOST)] = described(
+    iteration: Annotated[str, *one_of(lambda: MOST_EVALUATIONS)] = described(
         'how the equations of a step are solved; "fixed-point" is the paper\'s way', "newton"
     )
     start: Annotated[str, *one_of(lambda: [start for row in SCHEMES.values() for start in row.starts])] = (
@@ -189,7 +189,7 @@ class Solver(Table):
         elif len(self.theta) != count:
             what = f"has {tables.entries(self.theta)}, but {self.scheme} needs {count} weights"
             yield self.wrong("theta", what, f"give {count} weights, or leave theta out")
-        elif row.sum_is_one and abs(sum(self.theta) - 1) > 1e-9:
+        elif row.sum_is_one and abs(sum(self.theta) - 1) > tables.ROUNDED:
             yield self.wrong("theta", f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1")
         if self.start not in row.starts:
             names = [name for name, each in SCHEMES.items() if self.start in each.starts]

@@ -18,6 +18,7 @@ _FITS = 0.005  # part of a turn by which a record may miss a whole number of tur
 _SEEN = 0.01  # per cent by which a record is stretched unsaid
 _NEAREST = 1e-9  # m; nothing is measured at places nearer to each other
 _FARTHEST, _FLATTEST = 1e9, 1e-15  # m; no wheel is larger, and no height less
+_MOST_PLACES = 10  # of the even grid for each that was measured
 _FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
 
 
@@ -37,7 +38,7 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
     require(far <= _FARTHEST, f"its places reach over {far:.3g} m; check their unit")
     turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
     if turns:
-        count = min(round(around / step), 10 * len(place) // turns)
+        count = min(round(around / step), _MOST_PLACES * len(place) // turns)
         few = f"{apart}, {count} in a turn of {turn:.3g} m; check their unit, or measure {_FEWEST} or more"
         require(count >= _FEWEST, few)
         inside = place - place[0] < turns * around - 0.5 * step  # the last value may repeat the first
@@ -52,7 +53,7 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
         length = turn
     else:
         span = float(place[-1] - place[0])
-        count = min(round(span / step) + 1, 10 * len(place))
+        count = min(round(span / step) + 1, _MOST_PLACES * len(place))
         grid = np.linspace(0.0, span, count)
         found = np.interp(grid, place - place[0], height)
         found -= np.polyval(np.polyfit(grid, found, 1), grid)

@@ -25,6 +25,7 @@ from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.schemes import SCHEMES
 
 SMALLEST, LARGEST = 1e-100, 1e100  # magnitudes of all numbers but 0, so that products neither vanish nor overflow
+ROUNDED = 1e-9  # relative difference of two numbers of a file that are the same
 MOST_WRONG_ENTRIES = 20  # of one list that are reported
 MOST_SINES = 2000  # of a surface that is not given as sines: a resolved case must not be larger than a case may be
 MISSING = "is missing"

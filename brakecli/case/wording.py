@@ -26,6 +26,7 @@ _WHAT = {
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
 }
 """The kinds of error that pydantic reports for one value of a case."""
+_LIKE, _LIKE_HERE = 0.7, 0.65  # least likeness of a misspelt key; in its own table less is enough: nmu for num
 _TEXT = "one line of text in quotes"
 _KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
@@ -78,9 +79,9 @@ def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
     parent, key = _table(path), str(path[-1])
     known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
     if key not in known:
-        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.65):  # nmu for num
+        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=_LIKE_HERE):
             return [(*path[:-1], near[0])]
-        key = next(iter(get_close_matches(key, known, n=1, cutoff=0.7)), "")
+        key = next(iter(get_close_matches(key, known, n=1, cutoff=_LIKE)), "")
     return [(*table, key) for table, kind in tables.items() if key in kind.model_fields]
 
 

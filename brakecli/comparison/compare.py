@@ -22,9 +22,16 @@ from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
+BUDGET = 60.0  # s
 REFERENCE, CHECK = 1e-12, 1e-10  # tolerances of the reference, and of the run that shows how good it is
 REFERENCE_SHARE = 0.3  # part of the budget that the reference may take
 FEWEST_SAMPLES = 64
+LONGER = 3.0  # times a part of the motion, which the budget must allow for a longer one to be computed
+AIM, MOST_LONGER = 0.7, 4.0  # part of the budget that it is to take, and times the part before, at most
+ERRORS_SHARE = 0.8  # part of the budget after which no further error is measured: the rest is for times
+SPREAD, BESIDE = 1.3, 0.005  # time of a turn over the last one, and s for each run beside its loop
+FEWEST_BINS = 3  # below a line, which otherwise is not told from the mean
+ROUNDING = 1e-9  # of the largest velocity: a line below that is rounding
 MOTION, FORCES = ("x", "y", "vx", "vy"), ("friction_force", "normal_force")  # what is compared
 MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less
 SLOW = 0.1  # s, of a loop
@@ -119,7 +126,7 @@ def compare(
     *,
     schemes: Sequence[str] = (),
     steps: Sequence[float] = (),
-    budget: float = 60.0,
+    budget: float = BUDGET,
     progress: Counted = lambda what, done, total: None,
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
@@ -137,7 +144,7 @@ def compare(
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
         reference_error = errors(checked.rows, reference.rows).error
-        _measure(sampled, entries, reference.rows, begin + 0.8 * budget, progress)
+        _measure(sampled, entries, reference.rows, begin + ERRORS_SHARE * budget, progress)
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
     _mark_front(entries)
@@ -168,9 +175,9 @@ def _reference(system: System, budget: float) -> Motion:
     while True:
         motion = _event_driven(part, REFERENCE, "there is no reference to compare with")
         seconds = motion.work.solve_seconds
-        if part.duration >= whole or 3.0 * seconds > budget:
+        if part.duration >= whole or LONGER * seconds > budget:
             return motion
-        longer = part.duration * min(4.0, 0.7 * budget / max(seconds, 1e-3))
+        longer = part.duration * min(MOST_LONGER, AIM * budget / max(seconds, 1e-3))
         part = replace(part, duration=min(longer, whole))
 
 
@@ -202,7 +209,7 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Cou
     for repeat in range(MOST_REPEATS):
         if repeat == SLOW_REPEATS:
             timed = [entry for entry in timed if entry.seconds[-1] < SLOW]
-        expected = 1.3 * sum(entry.seconds[-1] for entry in timed) + 0.005 * len(timed)
+        expected = SPREAD * sum(entry.seconds[-1] for entry in timed) + BESIDE * len(timed)
         if time.perf_counter() + expected > deadline:
             return max(repeat, 1)
         for done, entry in enumerate(timed):
@@ -261,13 +268,13 @@ def errors(rows: Floats, reference: Floats) -> Errors:
 def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None]:
     """Relative error of the amplitude, and error of the phase, of the reference's strongest line."""
     count = len(reference) // 4
-    if count < 64:
+    if count < FEWEST_SAMPLES:
         return None, None
     window = np.hanning(count + 2)[1:-1]
     late = reference[-count:] - reference[-count:].mean()
     size = np.abs(np.fft.rfft(window * late))
     top = int(np.argmax(size))
-    if top < 3 or size[top] <= 1e-9 * count * float(np.abs(reference).max()):
+    if top < FEWEST_BINS or size[top] <= ROUNDING * count * float(np.abs(reference).max()):
         return None, None
     turning = np.exp(-2j * math.pi * top / count * np.arange(count)) * window
     exact, found = complex(turning @ late), complex(turning @ (values[-count:] - values[-count:].mean()))

@@ -4,17 +4,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from brakecli.case.tables import LARGEST, SMALLEST
 from brakecli.errors import UsageError
 from brakecli.faces import argument
 from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.method import Method
 from brakecli.solver.schemes import SCHEMES
-from brakecli.solver.system import System
+from brakecli.solver.system import WHOLE, System
 
 COARSEST, RUNGS = 16, 7  # steps per period of the fastest motion that a ladder begins with; steps on it
-TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
-ON_NODES = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
-NODE_FACTORS = (0.25, 0.5, 2.0, 4.0)
+TOLERANCES: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
+ON_NODES: tuple[float, ...] = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
+NODE_FACTORS: tuple[float, ...] = (0.25, 0.5, 2.0, 4.0)
 
 
 def method_label(kind: Method) -> str:
@@ -86,13 +87,13 @@ def parse_steps(text: str | None) -> list[float]:
         steps = [float(part) for part in text.split(",")]
     except ValueError:
         steps = []
-    if not steps or not all(1e-100 < step < 1e100 for step in steps):
+    if not steps or not all(SMALLEST < step < LARGEST for step in steps):
         raise UsageError(
             f"{argument('steps')} {text}: is not a list of steps; "
             f"write, for instance, {argument('steps')} 1e-5,5e-6"
         )
     largest = max(steps)
-    if any(abs(largest / step - round(largest / step)) > 1e-9 * largest / step for step in steps):
+    if any(abs(largest / step - round(largest / step)) > WHOLE * largest / step for step in steps):
         raise UsageError(f"{argument('steps')} {text}: each must divide the largest; halve it, for instance")
     if len({round(largest / step) for step in steps}) < len(steps):
         raise UsageError(f"{argument('steps')} {text}: names a step twice; give each once")

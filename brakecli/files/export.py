@@ -25,6 +25,8 @@ PEAK = 10.0 ** (-3.0 / 20.0)  # -3 dB of full scale
 _BLOCK = 1 << 16  # rows read at a time
 _LONGEST = 3600.0  # s of sound
 _QUIET = 1e-3  # part of the power that may be left out unsaid
+_LARGEST_RATIO = 10_000  # whole numbers of samples that a resampled sound is made by
+_LOST = 1e-6  # of the largest value: a sound that is less is none
 _HEARD = 20.0  # Hz
 _FORMULAS = ("=", "+", "-", "@")  # what begins one in a spreadsheet
 _UNEVEN = 1e-3  # of the time between two samples, by which it may vary
@@ -192,9 +194,9 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
         lost = float(power[frequency > 0.5 * RATE].sum() / power.sum())
         if lost > _QUIET:
             notes.append(f"{lost:.2%} of the power of {name} is above {0.5 * RATE:g} Hz and not in the sound")
-    ratio = Fraction(RATE / rate).limit_denominator(10_000)
+    ratio = Fraction(RATE / rate).limit_denominator(_LARGEST_RATIO)
     sound = resample_poly(values, ratio.numerator, ratio.denominator) if ratio else np.zeros(1)
-    if not (peak := float(np.abs(sound).max())) > 1e-6 * float(np.abs(values).max()):
+    if not (peak := float(np.abs(sound).max())) > _LOST * float(np.abs(values).max()):
         above = f"all of {name} is above {0.5 * RATE:g} Hz, which no sound holds"
         raise UsageError(f"{result.path}: {above}; export .csv")
     tone = result.attributes.get("frequency") or frequency[np.argmax(power)]

@@ -28,6 +28,7 @@ from brakecli.solver.system import System
 CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of a run that checks, which is cut short beyond
 _DECAYED, _DECAYED_SAMPLES = 15.0, 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
+_TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
 _ALL_CHECKS_SECONDS = 10.0  # estimated time of all runs that check after which no more is begun
 
 
@@ -147,7 +148,7 @@ def _far(margin: float | None, own: float) -> str:
     """How far the critical friction lies from a case's own."""
     if not margin:
         return ""
-    if margin > 10.0:
+    if margin > _TIMES:
         return f", {margin + 1.0:.3g} times the case's {own:g}"
     part, where = 100.0 * abs(margin), "above" if margin > 0.0 else "below"
     return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"

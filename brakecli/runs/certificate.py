@@ -12,6 +12,8 @@ from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
 
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
+MISSED = 1.0000001
+"""Least error, over the promised one, of a run that does not keep it."""
 DISPLACED = 64.0 * float(np.finfo(float).eps)
 """How far a replica starts away, over its distances: the roundings of 64² steps add up to that at random."""
 

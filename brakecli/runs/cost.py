@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.stability.report import LARGEST_FRICTION
+from brakecli.analysis.stability.report import FRICTIONS, LARGEST_FRICTION
 from brakecli.errors import CaseError
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.steady_sliding import PLACES, TABLE, averaged_length, fills_window, steady_sliding
@@ -18,8 +18,18 @@ _NODE_SECONDS = 5e-10  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 1.5e-10
 _WINDOW_WAVES, _POINT_WAVE_SECONDS = 3, 3e-10  # with a window: as many waves; to fill it, per point and wave
 _TERM_SECONDS, _PAIR_SECONDS = 2.5e-8, 5e-10  # exact, for each wave on the pad: per harmonic, and per pair of them
+_PAIRS, _OWN_PAIRS = 20.0, 80.0  # of waves in full contact, which take as long as the rest of a step
 _EVALUATIONS = 1.5  # of the contact in a step
-_OWN_STEPS = 25.0  # in a period, of a scheme that finds them itself, at a tolerance of 1e-10
+_OWN_STEPS, _AT = 25.0, 1e-10  # in a period, of a scheme that finds them itself, at this tolerance
+_ORDER = 8  # of these steps
+_STEPS_PER_WAVE, _DECAY = 8.0, 4.0  # such steps for a passing wave, and decay rate times such a step
+_FINER, _FINEST, _COARSEST = (
+    1e-5,
+    1e-13,
+    1e-8,
+)  # tolerance of steps, over that of histories, and its bounds
+_RUNS = 1.6  # where histories keep a tolerance
+_PRESSED, _PLAYS = 0.01, 0.12  # part of the time in which a pad is open in part: under load, and elsewhere
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
 _EXACT_STEP_SECONDS = 1e-7  # events included
@@ -43,7 +53,7 @@ def guessed(system: System) -> Price:
     """A rough guess at what a case costs, without its file and its verdict."""
     method, pairs = system.method, 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
-        each = _STEP_SECONDS * (1.0 + pairs / 20.0)
+        each = _STEP_SECONDS * (1.0 + pairs / _PAIRS)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
         window = _window_seconds(system, system.sampled_duration * system.fastest_belt)
@@ -51,22 +61,22 @@ def guessed(system: System) -> Price:
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
         return Price(system.steps, system.steps * _EXACT_STEP_SECONDS)
-    tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), 1e-13)
+    tolerance = method.tolerance if alone else max(min(_FINER * method.tolerance, _COARSEST), _FINEST)
     fastest, start = system.natural_frequencies[1], system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
-    rate = max(fastest * _OWN_STEPS * (1e-10 / tolerance) ** 0.125, 0.5 * math.sqrt(bound / c.m))
+    rate = max(fastest * _OWN_STEPS * (_AT / tolerance) ** (1.0 / _ORDER), 0.5 * math.sqrt(bound / c.m))
     swing = 2.0 * math.pi * fastest * (abs(start.x) + abs(start.y)) + abs(start.vx) + abs(start.vy)
     turns = float(max(system.wheel.turns, default=0.0))
-    rate += 8.0 * turns * (system.fastest_belt + swing) + 0.25 * (c.b_xx + c.b_yy) / c.m
+    rate += _STEPS_PER_WAVE * turns * (system.fastest_belt + swing) + (c.b_xx + c.b_yy) / _DECAY / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
-    each = _OWN_STEP_SECONDS * (1.0 + pairs / 80.0)
+    each = _OWN_STEP_SECONDS * (1.0 + pairs / _OWN_PAIRS)
     if system.finds_patches:
         # Rough surfaces that the load presses together are seldom open in part.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
         least_load = float(np.abs(system.load["value"]).min())
-        open_part = 0.01 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
+        open_part = _PRESSED if heights * (c.c_yy + system.contact_stiffness) < least_load else _PLAYS
         each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
-    return Price(steps, (1.0 if alone else 1.6) * steps * each)
+    return Price(steps, (1.0 if alone else _RUNS) * steps * each)
 
 
 def beside_seconds(system: System) -> float:
@@ -90,7 +100,7 @@ def start_seconds(system: System) -> float:
 
 def stability_seconds(system: System) -> float:
     """A rough guess at the time to find steady sliding at every friction coefficient of `stability`."""
-    tried = np.linspace(0.0, LARGEST_FRICTION, 41).tolist()
+    tried = np.linspace(0.0, LARGEST_FRICTION, FRICTIONS).tolist()
     if system.belt_speed == 0.0 or not any(_opens(system, phi) for phi in tried):
         return 0.0
     return (TABLE + _START_EVALUATIONS) * _average_seconds(system)

@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from brakecli.runs.certificate import ROUNDING, Certificate, Certified, Rounding, compare, replica
+from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, Rounding, compare, replica
 from brakecli.solver.contact import EVALUATORS
-from brakecli.solver.contact.pad import default_nodes
+from brakecli.solver.contact.pad import NODES, default_nodes
 from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
 
@@ -21,7 +21,9 @@ FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is e
 MOST_SPARSE = 4  # halvings of a first step before it has reached the sample interval, at most
 MOST_DOUBLINGS = 12  # of steps and nodes each
 STEPS_BETWEEN_KNOTS = 4  # of speed or load, at least: with fewer, no run sees what happens there
+SAFETY = 3.0  # what is promised, over what differences of runs say is left
 JUMPS = 3.0  # what the estimate of steps is multiplied by where friction turns, or speed or load have knots
+NEXT = 2.2  # time of a run with half the steps, or twice the nodes, over that of the last one
 MOST_SECONDS = 900.0  # time of the loop after which no finer run is begun
 
 
@@ -46,8 +48,8 @@ class _Axis:
             return self.last
         if math.isinf(self.before) or self.last >= self.before:
             return math.inf
-        least = max(self.last, 3.0 * self.before / 12.0)
-        return self.margin * max(least, 3.0 * self.last / (self.before / self.last - 1.0))
+        least = max(self.last, SAFETY * self.before / 12.0)
+        return self.margin * max(least, SAFETY * self.last / (self.before / self.last - 1.0))
 
 
 @dataclass
@@ -92,13 +94,13 @@ def ladder(system: System) -> Generator[System, Motion, Certified]:
             break
         coarse = failed or not short or jump > 0.5 * rounding.left
         finer = steps if coarse or margin * steps.error >= used.error else quadrature
-        late = run.system.interval == system.interval and seconds + 2.2 * spent > MOST_SECONDS
+        late = run.system.interval == system.interval and seconds + NEXT * spent > MOST_SECONDS
         if finer.doublings == MOST_DOUBLINGS or late:
             break
         finer.doublings += 1
     error += rounding.error
     if not (certified := kept and error <= wanted):
-        error = max(error, wanted * 1.0000001) if short and error < math.inf else 1.0
+        error = max(error, wanted * MISSED) if short and error < math.inf else 1.0
     with_nodes = f" and {run.system.nodes} nodes" if used is quadrature else ""
     finest = f"steps of {run.system.step:.3g} s{with_nodes}"
     how = f"{system.method.scheme} runs down to {finest}, and a replica of the first"
@@ -140,4 +142,4 @@ def first_nodes(system: System) -> int:
         return 0
     usual = default_nodes(system.half_length, system.shoe, system.wheel)
     finer = max(0, int(0.5 * math.log2(FINEST_FIRST / system.method.tolerance)))
-    return max(64, usual // 4) << finer
+    return max(NODES, usual // 4) << finer

@@ -35,6 +35,11 @@ UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
 WORTH_SAYING = 5.0  # s, of work before which its time is said
 _COARSE_NODES = NODES_PER_WAVE / 2
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
+FILE_BYTES = 1e5  # of a result without its samples
+_PROCESS_BYTES = 2e8  # of memory, without histories and tables
+_ABOVE_NYQUIST = 0.4  # of a period: the longest advised sample interval, with room below half of it
+_SHORTEST, _KNOWN = 1e-6, 1.001  # step over that of the case to which a stable one is sought, and its bracket
+_GROWN = 1e-3  # growth by the end of the run that is worth a warning
 _ROUNDING = 1e-8  # of the factors of a step
 
 
@@ -74,8 +79,8 @@ def check(system: System, *, begin: bool = False) -> Check:
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
         seconds=price.seconds + beside_seconds(system),
         at_least=price.at_least or system.settles,
-        memory=2.0e8 + system.table_bytes + held_bytes(system),
-        file_size=float(system.samples) * ROW_BYTES + 1e5,
+        memory=_PROCESS_BYTES + system.table_bytes + held_bytes(system),
+        file_size=float(system.samples) * ROW_BYTES + FILE_BYTES,
         adjustments=tuple(adjustments(system)),
     )
     return replace(found, warnings=tuple(_warnings(found)))
@@ -126,9 +131,9 @@ def _longest_stable_step(system: System) -> float | None:
     def is_stable(step: float) -> bool:
         return not _blows_up(step_limits(system, step).growth, system.sampled_duration / step)
 
-    if not is_stable(1e-6 * system.step):
+    if not is_stable(_SHORTEST * system.step):
         return None
-    return bisect(is_stable, 1e-6 * system.step, system.step, ratio=1.001, geometric=True)[0]
+    return bisect(is_stable, _SHORTEST * system.step, system.step, ratio=_KNOWN, geometric=True)[0]
 
 
 def _down(number: float) -> str:
@@ -172,7 +177,7 @@ def _warnings(found: Check) -> Iterator[str]:
     for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
         if frequency > nyquist:
             above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would be aliased"
-            remedy = f"sample every {_down(0.4 / frequency)} s or more often"
+            remedy = f"sample every {_down(_ABOVE_NYQUIST / frequency)} s or more often"
             yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
     if per_wave is not None and per_wave < _COARSE_NODES:
         remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
@@ -218,7 +223,7 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
     if not limits.unique:
         wedged = "friction can wedge the shoe into the wheel within a step; reduce solver.step or the coefficient"
         yield f"friction.coefficient: a step may have more than one solution, as {wedged}"
-    if limits.growth > 1.0 + max(UNSTABLE, 1e-3 / steps):
+    if limits.growth > 1.0 + max(UNSTABLE, _GROWN / steps):
         what = f"the scheme itself multiplies disturbances by {limits.growth:.6g} in each step"
         yield f"solver.theta: {what}; reduce solver.step, {method.row.unstable}"
     taken = 0.0 if method.own_steps else _taken(system, steps)

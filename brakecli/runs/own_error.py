@@ -12,10 +12,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.runs.certificate import ROUNDING, Certificate, Certified, displacement, sizes
+from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, displacement, sizes
 from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.ladder import MOST_SECONDS, first_nodes
 from brakecli.solver.compile import Floats
+from brakecli.solver.contact.pad import NODES
 from brakecli.solver.motion import Motion
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import MOST_TABLE_BYTES, System
@@ -115,7 +116,7 @@ def promised(
         rung = found or rung
     motion.work.solve_seconds = seconds
     if not certified:
-        error = max(error, wanted * 1.0000001) if error < np.inf else 1.0
+        error = max(error, wanted * MISSED) if error < np.inf else 1.0
     method, with_nodes = rung.method, f" and {rung.nodes} nodes" if rung.nodes else ""
     steps_of = f"to {method.tolerance:.0e}" if method.own_steps else f"of {rung.step:.3g} s"
     how = f"the error that is carried along with steps {steps_of}{with_nodes}"
@@ -130,7 +131,7 @@ def _finer(system: System, rung: System, steps: float, by_nodes: float) -> Syste
     if at.tolerance < _BEYOND * _FINEST * steps:
         return None
     tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), _FINEST)
-    found = _run(system, tolerance, 64 * -int(-rung.nodes * min(by_nodes**0.5, _MOST) // 64))
+    found = _run(system, tolerance, NODES * -int(-rung.nodes * min(by_nodes**0.5, _MOST) // NODES))
     return found if found.method != at else None
 
 

@@ -18,14 +18,19 @@ from brakecli.solver.system import MOST_STEPS, System
 
 SECONDS = 0.15
 """Processor time (s) after which a part is given up. Other programs do not change it."""
-ENOUGH, AIM = 0.05, 0.1
-"""Time (s) of a part from which on no longer one is run, and that the next one is to take at most."""
-FIRST, SHORTER = 5e-4, 16.0
-"""Guessed time (s) of the first part, and by what it becomes shorter where it is given up."""
-LEAST, MOST = 2.0, 32.0
-"""By what a part is longer than the one before."""
-MOST_EVALUATION, MOST_AT_NODES = 0.02, 2e-3
-"""Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried."""
+ENOUGH = 0.05
+"""Time (s) of a part from which on no longer one is run: a third of what is allowed, as it may be run twice."""
+AIM = 2.0 * ENOUGH
+"""Time (s) that the next part is to take, so that it is at least twice as long."""
+FIRST = 5e-4
+"""Guessed time (s) of the first part: a guess may be a hundred times too small."""
+SHORTER = 16.0
+"""By what the first part becomes shorter where it is given up; a choice."""
+LONGER = 32.0
+"""By what a part is longer than the one before, at most; a choice: a short one may only have started."""
+MOST_EXACT, MOST_AT_NODES = 0.02, 2e-3
+"""Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried. Choices:
+a part takes many."""
 FINER = 1.5
 """Time of the rest over that by a straight line, where a tolerance is kept: long runs may take finer steps."""
 SLOWER = 2.0
@@ -46,7 +51,7 @@ class _Part(NamedTuple):
 
 def measured(system: System) -> Price | None:
     """The cost of a case by runs of its beginning, or None where a single step may take too long."""
-    if evaluation_seconds(system) > (MOST_EVALUATION if system.finds_patches else MOST_AT_NODES):
+    if evaluation_seconds(system) > (MOST_EXACT if system.finds_patches else MOST_AT_NODES):
         return None
     if (start := start_seconds(system)) <= SECONDS:
         return _begun(system)
@@ -71,7 +76,7 @@ def _begun(system: System) -> Price:
             continue
         if part.motion is None or part.seconds >= ENOUGH:
             break
-        before, length = part, min(length * min(max(AIM / max(part.seconds, 1e-9), LEAST), MOST), duration)
+        before, length = part, min(length * min(AIM / max(part.seconds, 1e-9), LONGER), duration)
     reached = length if unknown else part.length
     rate = max(part.seconds - before.seconds, 0.0) / (reached - before.length)
     rate *= FINER if method.step is None and not method.row.exact else 1.0

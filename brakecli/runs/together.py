@@ -21,8 +21,8 @@ from brakecli.solver.system import System
 
 TOGETHER = 64
 """Cases that are certified side by side."""
-FIRST_TURN = 0.12
-"""By which angle (rad) the fastest motion turns in a first step, for a tolerance of 1e-3."""
+FIRST_TURN, AT = 0.12, 1e-3
+"""By which angle (rad) the fastest motion turns in a first step, for this tolerance."""
 FIRST_PER_WAVE = 8.0
 """First steps to a passing wave, at least."""
 SAFETY = 3.0
@@ -35,7 +35,7 @@ _MOST = 16.0  # times as fine, beyond which a run of its own is cheaper
 def _runs(system: System) -> Generator[System, Motion, Certified]:
     """What is run in lanes for a promise."""
     fastest, waves = 2.0 * math.pi * system.natural_frequencies[1], FIRST_PER_WAVE * system.passing_frequency
-    turn = FIRST_TURN * (system.method.tolerance / 1e-3) ** (1.0 / ORDER)
+    turn = FIRST_TURN * (system.method.tolerance / AT) ** (1.0 / ORDER)
     nodes, start_error = 2 * first_nodes(system), displacement(system)
 
     def rung(per_sample: float, more: float) -> System:

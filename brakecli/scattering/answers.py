@@ -8,7 +8,7 @@ from scipy import stats
 from brakecli.analysis.probability import LEVEL
 from brakecli.solver.compile import Floats
 
-SHARES = (0.05, 0.25, 0.5, 0.75, 0.95)
+SHARES: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Of samples below the quantiles that are told."""
 _RESAMPLED = 200  # times, for what chance makes of indices
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.probability import Probability
 from brakecli.analysis.regime.decision import Excitation, Regime
+from brakecli.analysis.stability.report import LARGEST_FRICTION
 from brakecli.case.read import key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem
@@ -33,7 +34,7 @@ from brakecli.sweeps.workers.task import Compute, Engine
 
 _SMOOTH_SECONDS, _ROUGH_SECONDS, _FEW_SECONDS = 4e-4, 0.1, 2.0
 """What the eigenvalues of a sample take, about; below which time no workers are started."""
-_CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": 10.0, "method": "eigenvalue"}
+_CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
 
 
 class Distribution(NamedTuple):

@@ -21,6 +21,11 @@ have to pull harder, so that backward slip follows, and on the side where it wou
 UNDECIDED = -1
 """Not a phase: the shoe touches at the velocity of the wheel, and the forces decide (`held`)."""
 
+CONE = 1.0 + 1e-12
+"""The friction cone over itself, by whose rounding a shoe still sticks."""
+SOONER = 0.125
+"""Part of a time in which a margin that begins at zero is sought above it, and of that part, and so on."""
+
 _MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6
 
 

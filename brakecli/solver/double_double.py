@@ -11,6 +11,10 @@ from numba import float64, types
 from brakecli.solver.compile import kernel
 
 _PAIR = types.UniTuple(float64, 2)
+EPSILON = 2.220446049250313e-16
+"""Distance from 1 to the next number."""
+ROUNDING = 4.0 * EPSILON
+"""Rounding of a sum of few terms, over their sizes."""
 _SPLITTER = 134217729.0  # 2^27 + 1
 
 

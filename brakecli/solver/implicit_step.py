@@ -19,6 +19,9 @@ _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""
 
+_ROUNDING = 4e-16  # of a height in the contact: twice that of a sum
+_OPENED = 10.0  # times the force, up to which a bracket without an upper end is opened; a choice
+_RUN_AWAY = 1e200  # N: a force whose square is no number
 _REACH = 2.0
 """How far the gap may move in the next step, over how far it has moved in the last."""
 
@@ -39,7 +42,7 @@ def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
     y = problem.y_0 + problem.gain * e
     _evaluate_at(layer.evaluate)(problem.x_0 + problem.gain * d, y, layer)
     problem.residual = layer.contact.normal_force - f
-    rounding = 4e-16 * layer.contact.stiffness * (abs(problem.y_0) + abs(problem.gain * e))
+    rounding = _ROUNDING * layer.contact.stiffness * (abs(problem.y_0) + abs(problem.gain * e))
     return problem.residual, rounding
 
 
@@ -107,7 +110,7 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
         # Outside the bracket, or a step not half of that before the last: halve the bracket, or open it upwards.
         # The bracket's own width says nothing: Newton's iteration may come from one side and leave the other.
         if not (low <= new <= high) or new == math.inf or abs(new - f) > 0.5 * before_last:
-            new = 0.5 * (low + high) if high < math.inf else 10.0 * max(low, contact.normal_force)
+            new = 0.5 * (low + high) if high < math.inf else _OPENED * max(low, contact.normal_force)
         allowed = abs(slope) * _RELATIVE * max(new, contact.normal_force) + rounding
         if _take_unevaluated(layer, problem, new, allowed):
             return SOLVED, evaluation, rising
@@ -127,6 +130,6 @@ def fixed_point(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
         if abs(r) <= _RELATIVE * max(f, contact.normal_force) + rounding:
             return SOLVED, evaluation, 0
         f = contact.normal_force
-        if not f < 1e200:
+        if not f < _RUN_AWAY:
             return UNCONVERGED, evaluation, 0
     return UNCONVERGED, most, 0

@@ -54,6 +54,7 @@ def _cache_directory() -> Path | None:
 
 _lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
 CACHE = _cache_directory()
+_PAUSE = 0.02  # s between two looks whether it has
 PATIENCE = 60.0  # s that another process may take to compile a kernel
 _held: list[int] = []  # the bytes locked for the kernels that this process compiles, each called by the one before
 
@@ -103,7 +104,7 @@ def _wait_for_others(place: int) -> None:
                 compiling.set_trouble(f"{what}, and is no longer waited for; end it if it hangs")
                 PATIENCE = 0.0  # nor for the other kernels
                 return
-            time.sleep(0.02)
+            time.sleep(_PAUSE)
 
 
 def _is_whole(path: str) -> bool:

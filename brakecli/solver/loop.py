@@ -16,6 +16,7 @@ from brakecli.solver.tangent import kept, meet, renew
 from brakecli.solver.tangent import solve as solve_disturbed
 from brakecli.solver.track import enter, mark, put, turned
 
+_ROUNDING = 1e-15  # of velocities, some units
 _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
 
 _evaluate_at, _prepare_at, _finish_at, _solve_at = (
@@ -65,7 +66,7 @@ def sample(p: Plant, row: Floats) -> None:
     bound = c.phi * normal
     belt_slope, load = slope_at(drive.belt, t), value_at(drive.load, t)
     sliding = v_x - belt
-    if abs(sliding) <= 1e-15 * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
+    if abs(sliding) <= _ROUNDING * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
         sliding = 0.0
     # Eq. (6) with the velocity and the acceleration of the wheel
     needed = c.m * belt_slope + c.b_xx * belt + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from brakecli.solver import schemes
 
-MOST = {"newton": 100, "fixed-point": 500}
+MOST_EVALUATIONS = {"newton": 100, "fixed-point": 500}
 """Evaluations of the contact that a step of each iteration may take before it counts as not converged."""
 
 

@@ -38,7 +38,7 @@ from brakecli.solver.schedules import integral_at, slope_at
 from brakecli.solver.schemes import OwnStepsModule, SteppingModule
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
-from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponent, seed
+from brakecli.solver.tangent import FEWEST_SAMPLES, MOST_POWERS, Exponent, exponent, seed
 from brakecli.solver.track import Track, follow, tracked
 from brakecli.stop import check_signals
 
@@ -46,6 +46,8 @@ EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
 BLOCK_SECONDS = 0.1
 """Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
+MOST_GROWTH = 10.0
+"""Largest block over the one before, whose time may have been chance."""
 BLOCK_ROWS = 16384
 EXACT_BLOCK = 16384
 """Steps in the first block of a scheme whose steps are exact: each costs far below a microsecond."""
@@ -200,7 +202,7 @@ class Stepping:
             rows = self.block(min(last, int(self.counts.level) + size))
             seconds = time.perf_counter() - start
             work.solve_seconds += seconds
-            size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, most)
+            size = min(int(size * min(MOST_GROWTH, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, most)
             check_signals()
             sink(rows)
             progress(int(self.counts.level) - lag)
@@ -223,7 +225,11 @@ class Stepping:
             track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
         own = None
         if self.tangent.knows == 1:
-            grown = math.exp(min(max(0.0, float(np.cumsum(self.tangent.logs).max())), 700.0)) if carried else None
+            grown = (
+                math.exp(min(max(0.0, float(np.cumsum(self.tangent.logs).max())), MOST_POWERS))
+                if carried
+                else None
+            )
             own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure), grown)
         return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 

@@ -21,6 +21,7 @@ PLACES = 1024
 """Positions of the wheel that an average takes, over 50 of its longest waves."""
 _LONGEST = 50.0
 TABLE = 129
+_HEIGHT, _RELATIVE = 1e-15, 1e-14  # errors of y: over the roughness, and over itself; a few units of rounding
 PRESSED = 1e-6
 """Least normal force of a pressed shoe, as a part of the load. Below it the force is a difference of numbers that
 are a million times as large, and a small change of any of them lifts the shoe off."""
@@ -180,7 +181,7 @@ def steady_sliding(
         elif unbalanced(full) < 0.0:
             from scipy.optimize import brentq
 
-            y = brentq(unbalanced, full, top, xtol=1e-15 * max(abs(full), abs(top), 1e-300), rtol=1e-14)
+            y = brentq(unbalanced, full, top, xtol=_HEIGHT * max(abs(full), abs(top), 1e-300), rtol=_RELATIVE)
         else:
             raise _none("the friction force lifts more than the load presses (self-locking)")
     force, stiffness, fraction = mean(float(y))

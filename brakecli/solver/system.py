@@ -12,7 +12,7 @@ from brakecli.solver import contact, schemes
 from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.method import MOST, Method
+from brakecli.solver.method import MOST_EVALUATIONS, Method
 from brakecli.solver.records import Coefficients, Grid, Weights
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, value_at
@@ -240,7 +240,7 @@ class System:
             self.per_sample,
             scheme.weighted_time(self.weights),
             scheme.LAG,
-            MOST[method.iteration],
+            MOST_EVALUATIONS[method.iteration],
             int(method.allow_unconverged),
             self.samples,
             method.tolerance,

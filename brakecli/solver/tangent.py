@@ -23,13 +23,16 @@ from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, T
 
 BATCHES = 8
 """Batches of the parts of the second half of a run."""
-PLACED = 1 / 16, 1 / 4
-"""Parts of a step by which the growth may be off at an event inside it, of a scheme whose velocity is that of the
-level reached, and of one that lags. Limit cycles, whose exponent is 0, have shown 0.06 and 0.34."""
+PLACED, PLACED_LAGGING = 1 / 16, 1 / 4
+"""Parts of a step by which the growth may be off at an event inside it. The first is for schemes whose velocity is
+that of the level reached, the second for those whose velocity lags. Limit cycles, whose exponent is 0, have shown
+0.06 and 0.34."""
 FEWEST_SAMPLES = 64
 """Of a run with an exponent, at which its growth is noted."""
 LEAST, MOST = 1e-280, 1e280
 """Size of a disturbance."""
+MOST_POWERS = 700.0
+"""Powers of e by which anything may grow or fade: e^709 is beyond all numbers."""
 
 
 class Exponent(NamedTuple):
@@ -69,11 +72,12 @@ def exponents(logs: Floats, duration: float) -> list[Exponent]:
 def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
     """The exponent of a run in the common loop.
 
-    The error also contains, for each event that a difference scheme has placed, the part `PLACED` of a step h (s)
-    in radians of the fastest motion.
+    The error also contains, for each event that a difference scheme has placed, the part `PLACED` of a step h (s),
+    in radians of the fastest motion, or the part `PLACED_LAGGING` where the velocity lags.
     """
     (found,) = exponents(t.logs[:, None], duration)
-    return found._replace(error=math.hypot(found.error, PLACED[lag] * t.rate * h * t.placed / duration))
+    placed = PLACED_LAGGING if lag else PLACED
+    return found._replace(error=math.hypot(found.error, placed * t.rate * h * t.placed / duration))
 
 
 @kernel(float64(float64, float64))

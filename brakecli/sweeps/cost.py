@@ -10,7 +10,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.faces import argument
 from brakecli.runs.cost import duration_text
-from brakecli.runs.limits import MOST_BYTES, check, refuse, within_range
+from brakecli.runs.limits import FILE_BYTES, MOST_BYTES, check, refuse, within_range
 from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.pilot import Pilot
@@ -86,7 +86,7 @@ def estimate(plan: Plan, workers: int) -> Estimate:
         workers=workers,
         seconds=pilot.sweep_seconds(each),
         memory=(_WORKER_BYTES + tables) * (workers + 1) + held + in_parent * records,
-        file_size=_RECORD_BYTES * records + 1e5,
+        file_size=_RECORD_BYTES * records + FILE_BYTES,
         at_least=guessed or pilot.at_least,
         together=pilot.together,
         refused=tuple(failing),

@@ -25,13 +25,16 @@ from brakecli.errors import CaseError
 from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.lyapunov import Steady, by_exponents
-from brakecli.sweeps.read_off import explored, on_waves
+from brakecli.sweeps.read_off import PART, explored, on_waves
 from brakecli.sweeps.sustained import sustained
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined, of_edges
 
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
+_OPENS = 0.999  # part of the stiffness of the whole pad, below which it opens
+_FINEST = 1e-9  # bracket of a change over the requested one, where evaluations are cheap
+_HIDDEN = 4.0  # errors, see `hidden`
 
 Signs = list[Rounded] | None
 """What is positive where sliding is stable; None where there is no steady sliding."""
@@ -114,8 +117,8 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
         return spectral_radius(system, rest.stiffness, system.coefficients.phi) > 1.0 + MARGIN
 
     first = steady_at(critical.lower)
-    opens = first is not None and first[1].stiffness < 0.999 * first[0].contact_stiffness
-    width = critical.tolerance * (1e-2 if opens else 1e-9)
+    opens = first is not None and first[1].stiffness < _OPENS * first[0].contact_stiffness
+    width = critical.tolerance * (PART if opens else _FINEST)
 
     def searched(unstable: Callable[[float], bool], edge: EdgeIn, count: int, middles: list[float]) -> Search:
         values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *middles})
@@ -165,7 +168,7 @@ def _certain(
         alone takes none nearby below -4.
         """
         signs = [each for k, each in enumerate(signs_at(value) or ()) if k in passing or not passing]
-        return any(-4.0 * each.error <= each.value <= each.error for each in signs)
+        return any(-_HIDDEN * each.error <= each.value <= each.error for each in signs)
 
     stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
     while hidden(stable) and stable != bound:

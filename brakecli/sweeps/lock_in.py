@@ -11,7 +11,7 @@ import tomli_w
 
 from brakecli.analysis.stability.follow import followed
 from brakecli.analysis.stability.report import is_stable, stability
-from brakecli.analysis.stability.search import bisect
+from brakecli.analysis.stability.search import HALVINGS, bisect
 from brakecli.case.case import given_toml
 from brakecli.case.read import LoadedCase
 from brakecli.case.roughness import Records
@@ -28,6 +28,8 @@ from brakecli.solver.system import System
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.result import unit
 from brakecli.sweeps.tables import Axis
+
+_ZERO = 1e-12  # of the range of the key: a critical value below that is 0, but for rounding
 
 
 @dataclass(frozen=True)
@@ -80,8 +82,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
                 progress("critical values", len(critical), len(critical) + 1)
                 return (is_stable(system_at(value)) is True) == at_low
 
-            middle = 0.5 * sum(bisect(as_below, ends[0], ends[1], halvings=45))
-            critical.append(middle if abs(middle) > 1e-12 * abs(values[-1] - values[0]) else 0.0)
+            middle = 0.5 * sum(bisect(as_below, ends[0], ends[1], halvings=HALVINGS))
+            critical.append(middle if abs(middle) > _ZERO * abs(values[-1] - values[0]) else 0.0)
     return LockIn(axis, entries, critical)
 
 

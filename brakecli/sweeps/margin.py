@@ -11,6 +11,8 @@ from brakecli.errors import CaseError, RefusedError
 from brakecli.runs.limits import within_range
 from brakecli.sweeps.plan import Plan
 
+MOST_POINTS = 10**5
+"""Points of a sweep whose settings are listed to find these cases; a choice."""
 MOST, MOST_ROUGH = 2500, 64
 """Cases whose critical friction is looked for, smooth and rough ones; a sweep that needs more gets no line."""
 _FRICTION = ("friction", "coefficient")
@@ -22,7 +24,7 @@ def margins(plan: Plan) -> NDArray[np.float64] | None:
     What is never stable is critical at 0, what no friction makes unstable at the largest friction searched. With a
     wheel at rest, or numbers out of range, it is NaN.
     """
-    settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= 10**5 else []
+    settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= MOST_POINTS else []
     others = {tuple(value for path, value in each.items() if path != _FRICTION): each for each in settings}
     try:
         rough = not all(system_of(plan.case(each)).smooth for each in settings[:: max(1, len(settings) - 1)])

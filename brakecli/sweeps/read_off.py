@@ -26,6 +26,8 @@ from brakecli.solver.system import System
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Edge, Piece, Search, joined
 
+PART = 0.01
+"""Bracket of a change by eigenvalues over the requested one, so that it adds nothing to that."""
 POINTS = 1500
 """Budget of points of all branches on a rough wheel. A time would make results depend on the machine."""
 VALUES = 33
@@ -95,7 +97,7 @@ def without_dashpots(critical: Critical, answers: Answers) -> Search:
 
     def edge(low: float, high: float) -> Edge:
         bounds = [bound for window in answers.windows for bound in window if low <= line.value(bound.p) <= high]
-        low, high = bisect(lambda v: unstable(v) is unstable(low), low, high, width=1e-2 * critical.tolerance)
+        low, high = bisect(lambda v: unstable(v) is unstable(low), low, high, width=PART * critical.tolerance)
         bars = [each.bar for each in bounds if low <= line.value(each.p) <= high]
         return Edge(0.5 * (low + high), 0.5 * (high - low) + (line.high - line.low) * max(bars, default=0.0))
 

@@ -30,6 +30,7 @@ from brakecli.sweeps.tables import Axis
 
 MOST_FAILURES = 100
 MOST_AS_JSON = 10_000  # points; of more the file alone holds every number
+_LISTED = 3  # points that are named
 WIDE = 0.1  # of the range, from which on an error bar is named
 _DONE = Status.DONE.encode()
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")  # by which sentences of one kind differ
@@ -192,9 +193,9 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
     if count and simple and (ends := _ends_of_loop(journal.plan, lasts)):
         said.append(f"hysteresis at {count} of {size} points: {ends}")
     elif count:
-        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:3]]
+        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:_LISTED]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
-        more = f"; and {count - 3} more" if count > 3 else ""
+        more = f"; and {count - _LISTED} more" if count > _LISTED else ""
         said.append(f"hysteresis at {count} of {size} points: {places}{more}")
     elif decided:
         those = f" at the {decided} point{'s that are' if decided > 1 else ' that is'} decided"

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from brakecli.analysis.regime.lasting import QUARTER
+from brakecli.analysis.regime.answers import FADED, QUARTER
 from brakecli.analysis.stability.advice import rounded
 from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
@@ -17,8 +17,8 @@ from brakecli.sweeps.plan import Plan, label
 
 MOST = 1000
 """Undecided points that are looked at, some milliseconds each."""
-SETTLING = 3.0
-"""Powers of e by which a vibration that has grown comes to its cycle, as the verdict on a run counts them."""
+WORTH = 0.9
+"""A run for some points is named where it is shorter than that for all, by this factor or less."""
 ROUNDING = float(np.finfo(float).eps)
 
 
@@ -48,7 +48,7 @@ def on_short_runs(journal: Journal) -> Iterator[str]:
         value = plan.sweep.axis[plan.followed].value(plan.places(point)[plan.followed])
         if rate > 0.0 and amplitudes[index] < _reach(theory):
             before = _theory(plan, _before(plan, point, down=index >= plan.points))
-            seconds = _growing(theory, before or theory) + SETTLING / rate
+            seconds = _growing(theory, before or theory) + FADED / rate
             growing.append((value, QUARTER * seconds))
     if growing:
         late = "sliding is unstable, but the runs end before a vibration has grown"
@@ -108,5 +108,5 @@ def _where(plan: Plan, found: list[tuple[float, float]]) -> str:
 def _remedy(found: list[tuple[float, float]]) -> str:
     """The duration that is long enough for all of the points, and the one that is for the first of them."""
     least, most = (pick(seconds for _, seconds in found) for pick in (min, max))
-    some = f"; {rounded(least, True)} s is enough for some" if least < 0.9 * most else ""
+    some = f"; {rounded(least, True)} s is enough for some" if least < WORTH * most else ""
     return f"a solver.duration of {rounded(most, True)} s is enough for all{some}"

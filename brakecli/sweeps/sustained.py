@@ -27,7 +27,7 @@ from brakecli.sweeps.windows import Outcome, Search
 
 GALLOP = 2.0
 """Factor from one stride to the next in looking for the end of sustained vibration."""
-DURATIONS = 1.0, 2.0, 4.0, 8.0
+DURATIONS: tuple[float, ...] = 1.0, 2.0, 4.0, 8.0
 """Durations of the case for which it is run where the equations say nothing."""
 SAME = 0.01
 """Relative change of the amplitude in a run twice as long that shows that a vibration lasts."""

@@ -18,7 +18,7 @@ from pydantic import ValidationError
 from brakecli.case.case import Case, changed, given_toml, resolved_toml
 from brakecli.case.read import parse_case, read_text, starters
 from brakecli.case.tables import json_schema, tables_within
-from brakecli.solver.method import MOST
+from brakecli.solver.method import MOST_EVALUATIONS
 from tests.case.examples import SMALL
 
 jsonschema = import_module("jsonschema")  # imported so because it has no type hints
@@ -67,7 +67,7 @@ layer_solvers = st.builds(
     st.sampled_from(["two-layer", "three-layer"]).flatmap(thetas),
     st.fixed_dictionaries(
         {"step": positives, "duration": positives},
-        optional={"iteration": st.sampled_from(list(MOST)), "allow_unconverged": st.booleans()},
+        optional={"iteration": st.sampled_from(list(MOST_EVALUATIONS)), "allow_unconverged": st.booleans()},
     ),
 )
 promising_solvers = st.fixed_dictionaries(

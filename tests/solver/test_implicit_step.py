@@ -13,7 +13,7 @@ from brakecli.solver import contact
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.friction import minimise
 from brakecli.solver.implicit_step import SOLVED, UNCONVERGED, fixed_point, newton
-from brakecli.solver.method import MOST
+from brakecli.solver.method import MOST_EVALUATIONS
 from brakecli.solver.motion import Stepping
 from brakecli.solver.records import CONTACT, PROBLEM, new
 from brakecli.solver.roughness import Surface, surface
@@ -64,7 +64,7 @@ class Step:
         self.evaluate(p.x_0 + p.gain * d, p.y_0 + p.gain * e, layer)
         return float(layer.contact.normal_force)
 
-    def run(self, solve: Any = newton, most: int = MOST["newton"]) -> tuple[int, int, int]:
+    def run(self, solve: Any = newton, most: int = MOST_EVALUATIONS["newton"]) -> tuple[int, int, int]:
         self.problem = self.given.copy()
         outcome: tuple[int, int, int] = solve(self.layer, self.problem, most)
         return outcome
@@ -159,7 +159,7 @@ def test_both_iterations_agree_where_both_converge(evaluator: str, steps: int) -
             continue
         outcome, _, rising = step.run(newton)
         by_newton, valid = step.force, step.contact.valid
-        paper, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
+        paper, evaluations, _ = step.run(fixed_point, MOST_EVALUATIONS["fixed-point"])
         assert (outcome, rising, paper) == (SOLVED, 0, SOLVED)
         assert evaluations <= 2 + math.log(1e-16) / math.log(max(contraction, 1e-16)) + 1 or step.noise() > 0
         if evaluator == "closed-form" and not valid:
@@ -181,7 +181,7 @@ def test_newton_solves_every_step_from_any_guess(seed: int) -> None:
         step.given.normal_force = guess
         outcome, evaluations, _ = step.run()
         assert outcome == SOLVED
-        assert evaluations < MOST["newton"]
+        assert evaluations < MOST_EVALUATIONS["newton"]
         assert step.force >= 0.0
         residual = step.force_at(step.force) - step.force
         assert abs(residual) <= step.tolerance()
@@ -262,22 +262,22 @@ def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float)
     assert evaluations <= 3
     assert step.force == pytest.approx(stiffness * 1e-5 / (1 + ratio), rel=1e-12)
     assert abs(step.force_at(step.force) - step.force) <= step.tolerance()
-    outcome, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
-    assert (outcome, evaluations) == (UNCONVERGED, MOST["fixed-point"])
+    outcome, evaluations, _ = step.run(fixed_point, MOST_EVALUATIONS["fixed-point"])
+    assert (outcome, evaluations) == (UNCONVERGED, MOST_EVALUATIONS["fixed-point"])
     assert abs(step.problem.residual) > 0.1 * step.force  # and the residual tells how far off
 
 
 def test_a_fixed_point_that_fails_is_never_taken_for_solved() -> None:
     outcomes = []
     for _, step in random_steps(36, 500, (-1.0, 4.0)):
-        outcome, evaluations, _ = step.run(fixed_point, MOST["fixed-point"])
+        outcome, evaluations, _ = step.run(fixed_point, MOST_EVALUATIONS["fixed-point"])
         outcomes.append(outcome)
         residual = abs(step.force_at(step.force) - step.force)
         if outcome == SOLVED:
             assert residual <= step.tolerance()
         else:
             assert outcome == UNCONVERGED
-            assert evaluations == MOST["fixed-point"]
+            assert evaluations == MOST_EVALUATIONS["fixed-point"]
             assert abs(step.problem.residual) == residual > 0.0
     assert 50 < outcomes.count(SOLVED) < 450
 

@@ -6,6 +6,14 @@ from enum import StrEnum
 from typing import Any, NamedTuple
 
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
+QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
+FADED = 3.0  # powers of e after which a change has ended: 5 % of it are left
+_SETTLED = 1.4  # a run over its settled part, where it is told how long it has to be; a choice
+
+
+def shown_after(duration: float, rate: float) -> float:
+    """Duration (s) of a run that shows what lasts, where something changes at this rate (1/s) after so long."""
+    return QUARTER * (duration + FADED / max(rate, 1e-300))
 
 
 class Fate(StrEnum):
@@ -104,8 +112,7 @@ class Answers(NamedTuple):
     @property
     def longer(self) -> float:
         """Duration after which a change has come to its end: its last quarter is judged."""
-        rate = abs(self.change) / (0.5 * self.duration)
-        return 4.0 / 3.0 * (self.duration + 3.0 / max(rate, 1e-300))
+        return shown_after(self.duration, abs(self.change) / (0.5 * self.duration))
 
     @property
     def own(self) -> float:
@@ -116,12 +123,12 @@ class Answers(NamedTuple):
     def grown(self) -> float:
         """Duration after which what grows has come to its limits."""
         limit = self.to_limit if math.isfinite(self.to_limit) else 0.0
-        return 4.0 / 3.0 * (self.duration + limit + 3.0 / self.own)
+        return shown_after(self.duration + limit, self.own)
 
     @property
     def waited(self) -> float:
         """Duration after which neighbours have come together."""
-        return 4.0 / 3.0 * (self.duration + 3.0 / max(abs(self.exponent), 1e-300))
+        return shown_after(self.duration, abs(self.exponent))
 
     @property
     def decay(self) -> float:
@@ -136,7 +143,7 @@ class Answers(NamedTuple):
     @property
     def two_waves(self) -> float:
         """Duration whose settled part holds two periods of the slowest wave."""
-        return 2.8 * self.slowest
+        return 2.0 * _SETTLED * self.slowest
 
     @property
     def lines(self) -> str:

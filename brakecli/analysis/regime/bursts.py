@@ -6,11 +6,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from brakecli.analysis.spectrum import Array, interpolated
+from brakecli.analysis.spectrum import FEWEST_CYCLES, Array, interpolated
 
 _FRAMES = 64  # parts of the record, half of which overlap; each holds
 _CYCLES = 8  # cycles of its strongest line at least
-_SHORTEST = 64
+_SHORTEST = 64  # samples of a frame at least
+_FEWEST = 4  # frames of a record at least
+_LOBE = 4.0  # bins that hold the main lobe of a Hann window
 _STANDS_OUT = 20.0  # power of a tone's bin over the mean of the noise, which reaches it in one bin of 5e8
 _SHARE = 0.3  # part of the energy of a frame in its tone
 _FAINT = 1e-3  # part of the power of the strongest tone
@@ -39,12 +41,12 @@ class Burst:
 
 def bursts(values: Array, interval: float) -> list[Burst]:
     """The bursts of a signal without gaps."""
-    if len(values) < 4 * _SHORTEST or not np.ptp(values):
+    if len(values) < _FEWEST * _SHORTEST or not np.ptp(values):
         return []
     whole = np.abs(np.fft.rfft(np.diff(values) * np.hanning(len(values) - 1)))  # differences, as drift is slow
-    period = len(values) / max(5 + int(np.argmax(whole[5:])), 1)
+    period = len(values) / max(FEWEST_CYCLES + int(np.argmax(whole[FEWEST_CYCLES:])), 1)
     wanted = max(len(values) / _FRAMES, _CYCLES * period, _SHORTEST)
-    size = 1 << int(min(np.ceil(np.log2(wanted)), np.log2(len(values) / 4)))
+    size = 1 << int(min(np.ceil(np.log2(wanted)), np.log2(len(values) / _FEWEST)))
     found = sorted(_tones(values, size), key=lambda tone: tone[0])
     strongest = max((power for _, _, power in found), default=0.0)
     groups: list[list[tuple[int, float, float]]] = []
@@ -82,7 +84,7 @@ def _burst(values: Array, interval: float, size: int, group: list[tuple[int, flo
     frequency = float(np.average([f for _, f, _ in group], weights=weights))
     low, high = max(0, begin - size), min(len(values), end + size)
     piece = values[low:high] - np.linspace(values[low], values[high - 1], high - low)
-    lines, half = np.fft.fftfreq(len(piece)), max(_SAME * frequency, 4.0 / size)
+    lines, half = np.fft.fftfreq(len(piece)), max(_SAME * frequency, _LOBE / size)
     tone = np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
     amplitude = uniform_filter1d(2.0 * np.abs(tone), max(1, min(size // 4, int(2 / frequency))))
     first, last = begin - low, end - low

@@ -20,6 +20,11 @@ _QUIET = 0.02  # and where all else is looked at
 _DRIFT_CYCLES = 8.0  # over which drift is averaged
 _COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
 _SHORTEST = 8  # samples in which noise can be told
+_BESIDE = 3.0  # times what its neighbours leave the median by, beyond which a sample is alone
+_FEWEST_PULSES, _ONE_WAY = 5, 0.6  # spikes, and their mean sign, from which on they may be pulses of slip
+_SHORT_GAP = 0.25  # of a cycle: a straight line over it changes no turning point by much
+_DRIFTS = 0.1  # drift over the motion, both in standard deviations, from which on it is reported
+DEVIATION = 1.4826  # standard deviation of a normal distribution over the median of the distances from its middle
 _LINES_LEFT = 0.5  # part of the energy on three lines that would be left without pulses that are no slips
 
 
@@ -104,7 +109,7 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_velocity(bridged(values), order > 0))
-        values, first = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
+        values, first = _longest_piece(values, max(1.0, _SHORT_GAP * cycle), notes)
         values = bridged(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
@@ -124,7 +129,7 @@ def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocit
         return velocity
     drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
     variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
-    if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):
+    if float(drift.std()) > _DRIFTS * float(np.sqrt(max(variance, 0.0))):
         notes.append("drift removed")
     return replace(velocity, values=velocity.values - drift)
 
@@ -134,7 +139,7 @@ def _velocity(values: Array, is_velocity: bool) -> Velocity:
     raw, noise = values if is_velocity else np.diff(values), 0.0
     mean = float(raw.mean()) if len(raw) else 0.0
     if len(values) >= _SHORTEST:
-        rough = np.diff(values, 3)
+        rough = np.diff(values, 3)  # has 20 times the variance of noise, whose median size is 0.6745 deviations
         local = float(np.median(np.abs(rough - np.median(rough)))) / 0.6745 / np.sqrt(20.0)
         line = np.linspace(values[0], values[-1], len(values))
         floor = np.median(np.abs(np.fft.rfft(values - line)) ** 2) / np.log(2.0) / len(values)
@@ -181,15 +186,15 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     """Replace single samples far from both sides. A velocity's pulses of slip are not spikes."""
     away = values - median_filter(values, 5, mode="nearest")
     low, high = np.quantile(values, [0.1, 0.9])
-    deviation = 1.4826 * float(np.median(np.abs(away)))
+    deviation = DEVIATION * float(np.median(np.abs(away)))
     spikes = np.abs(away) > max(_SPIKE_DEVIATIONS * deviation, _SPIKE_RANGE * float(high - low))
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
-    spikes &= np.abs(away) > 3.0 * beside
+    spikes &= np.abs(away) > _BESIDE * beside
     count = int(np.sum(spikes))
     if count == 0:
         return values
     without = bridged(np.where(spikes, np.nan, values))
-    if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
+    if is_velocity and count >= _FEWEST_PULSES and abs(float(np.mean(np.sign(away[spikes])))) > _ONE_WAY:
         power = np.abs(np.fft.rfft(_without_slow(without))) ** 2
         if line_share(power) < _LINES_LEFT:  # nothing is left without them
             return values

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli.analysis.regime.cycles import Cycles
-from brakecli.analysis.regime.evidence import WINDOWS, Part, trend
+from brakecli.analysis.regime.evidence import LAST, WINDOWS, Part, trend
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear, force_parts, parts
@@ -18,6 +18,9 @@ from brakecli.solver.history import stacked
 RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
 _REST = 0.3  # of a forced motion, by which its closed form may be off
 _LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
+_STAYS = 0.25  # part of the expected decay; what decays by less of it in the second half does not decay
+_ABOVE = 1.2  # times what is left in the last quarter: windows below that hold no more than is left
+ROOM = 1.05  # a requested run is longer than needed by this, so that it holds whole samples and windows
 
 
 @dataclass
@@ -67,7 +70,7 @@ def _settle_force(found: Sequence[Lasting], shown: Sequence[Shown], decays: Sequ
     forced, rings = force_parts(theories, *_whole(shown).places("y"))
     gone = _gone(shown, decays, rings, forced)
     for each, theory, decay, left in zip(found, theories, decays, gone, strict=True):
-        if left.window <= WINDOWS - 10:
+        if left.window <= WINDOWS - LAST:
             each.force_from = left.window * each.part.stop // WINDOWS
         elif theory.slip is not None:
             each.force_rings = _wait(decay, left)
@@ -92,11 +95,11 @@ def _gone(shown: Sequence[Shown], decays: Sequence[float], own: Array, forced: A
     starts, within = -(-own.shape[1] * np.arange(WINDOWS) // WINDOWS), shown[0].limits.settled_within
     high, low = (each.reduceat(own, starts, axis=1) for each in (np.maximum, np.minimum))
     left = 0.5 * (high - low)
-    end = 0.5 * (high[:, -10:].max(axis=1) - low[:, -10:].min(axis=1))  # a window may be shorter than a period
+    end = 0.5 * (high[:, -LAST:].max(axis=1) - low[:, -LAST:].min(axis=1))  # a window may be shorter than a period
     change, _ = trend(np.log(np.maximum(left[:, WINDOWS // 2 :], 1e-300)))
     lost = 0.5 * np.array(decays) * shown[0].duration
-    stays = (0.5 * lost > RELAXED) & (change > -0.25 * lost)
-    level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, 1.2 * end), within * forced)
+    stays = (0.5 * lost > RELAXED) & (change > -_STAYS * lost)
+    level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, _ABOVE * end), within * forced)
     late = (left > level[:, None])[:, ::-1]
     window = np.where(late.any(axis=1), WINDOWS - late.argmax(axis=1), 1)
     return [_Gone(*row) for row in zip(*(each.tolist() for each in (window, level, end, stays)), strict=True)]
@@ -108,11 +111,11 @@ def _closed(shown: Shown, theory: Linear, decay: float, forced: float, gone: _Go
         return None
     found = Lasting(shown.judged, False, forced, None, forced)
     begin, slow = gone.window * shown.samples // WINDOWS, shown.slowest(0.0)
-    if gone.window <= WINDOWS - 10 and shown.duration - begin * shown.interval >= 2.0 * slow:
+    if gone.window <= WINDOWS - LAST and shown.duration - begin * shown.interval >= 2.0 * slow:
         found.part, found.settled = shown.part(begin), True
     else:
         late = shown.duration + _wait(decay, gone)
-        needed = max(_LONGER * late, 1.05 * (late + 2.0 * slow))
+        needed = max(_LONGER * late, ROOM * (late + 2.0 * slow))
         found.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
     seconds = shown.duration - max(min(shown.quarter * shown.interval, shown.duration - slow), 0.0)
     if (beat := shown.beat()) > seconds and theory.opens:

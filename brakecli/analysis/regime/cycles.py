@@ -12,9 +12,11 @@ from brakecli.solver.track import LIFT, MIN, SLIP, STICK, TOUCH, Events
 
 _HARMONICS = 5
 _MOST_RISES_PER_CYCLE = 4
+_FEWEST = 3  # cycles in which a drift can be told from their spread
 _GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
-_BANDS = (0.2, 0.35, 0.6, 0.1)  # of the standard deviation of vx, in the mean of a rise: what is slower is ripple
+# Of the standard deviation of vx, in the mean of a rise. A slower rise is ripple.
+_BANDS: tuple[float, ...] = 0.2, 0.35, 0.6, 0.1
 _SAME = 0.035  # squared difference, over twice the variance, between one period of the mean of vx and the next:
 # where vx jumps, interpolation between eight samples of a cycle makes 0.031 of it
 _AS_SAME = 4.0  # times the least of these, up to which a shorter period is the period
@@ -69,7 +71,7 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
     half a period of Ω.
     """
     begins, lag = _beginnings(part, events)
-    if len(begins) < 4:
+    if len(begins) <= _FEWEST:
         return None
     cycles, interval = len(begins) - 1, part.history.interval
     edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)

@@ -16,6 +16,7 @@ from brakecli.solver.quantities import ContactState
 
 FEWEST_SAMPLES = 160  # of a history that has an envelope
 WINDOWS = 40
+LAST = 10  # windows of the last quarter, which gives the final values
 LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
 LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
 _MOST_LINES = 8

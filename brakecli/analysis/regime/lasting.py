@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.regime.answers import Answers
-from brakecli.analysis.regime.closed import RELAXED, Lasting, forced_linear
+from brakecli.analysis.regime.answers import QUARTER, Answers, shown_after
+from brakecli.analysis.regime.closed import RELAXED, ROOM, Lasting, forced_linear
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.regime.evidence import Part
@@ -27,7 +27,9 @@ _IMPACT_AMPLITUDE_ERROR = 0.5  # largest error of a cycle's amplitude, as a part
 _IMPACT_FREQUENCY_ERROR = 0.1  # and of its frequency
 _MODULATES = 0.1  # of a vibration, beside which waves count: smaller ones change its cycles, too
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line is the frequency
-QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
+_AIM = 0.3  # part of `_SHIFTED` to which the requested step brings the shift; a choice
+_WHOLE = 0.999  # part of the pattern of waves that counts as all of it: samples may miss the rest
+_FINER = 0.25  # requested sample interval over the one that misses impacts; a choice
 _VAGUE = "the amplitude may be off by as much as itself: run longer, or take a smaller solver.step"
 
 
@@ -110,7 +112,7 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
     seconds = (part.stop - part.start) * interval
     if not chaos and (not found.settled or seconds * rate < RELAXED):
         found.settled = False
-        needed = QUARTER * (shown.duration + 3.0 / max(rate, 1e-300))
+        needed = shown_after(shown.duration, rate)
         text = f"what the shoe adds dies away at only {rate:.3g} 1/s"
         found.notes["settled"] = f"{text}: run at least {needed:.3g} s to see the amplitude that lasts"
     elif found.settled and seconds < (beat := shown.beat()):
@@ -173,10 +175,10 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     turns = answers.period_without_waves * cycles.frequency
     far = not off <= shown.limits.settled_within * answers.amplitude_without_waves  # also where it is not known
     far |= math.isfinite(turns) and abs(turns - round(turns)) > _DRIFT * turns
-    longer = f"run at least {QUARTER * (shown.duration + 3.0 / max(rate, 1e-9)):.3g} s for numbers that last"
+    longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if shift >= _SHIFTED:
-        step = shown.context.step * math.sqrt(0.3 * _SHIFTED / shift)
+        step = shown.context.step * math.sqrt(_AIM * _SHIFTED / shift)
         text = f"this vibration settles at only {rate:.2g} 1/s, and impacts of so few steps may shift it by"
         text += f" {_IMPACT_AMPLITUDE_ERROR * shift:.0%}"
         text += f": take a solver.step of {step:.2g} s, or a solver.tolerance"
@@ -188,7 +190,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     elif changed > _DRIFT:
         text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part: {longer}"
     elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
-        text = f"the waves beat every {beat:.3g} s: run at least {1.05 * (part.start * interval + beat):.3g} s"
+        text = f"the waves beat every {beat:.3g} s: run at least {ROOM * (part.start * interval + beat):.3g} s"
         text += " for numbers that last"
     found.settled, found.notes["settled"] = lasts and text is None, text
 
@@ -253,7 +255,7 @@ def _add_force(shown: Shown, found: Lasting, mean: float, variation: float, *, l
     if found.cycles:
         found.variation = found.cycles.force_variation
         if found.variation is None:
-            finer = f"give an output.sample_interval of {0.25 * interval:.2g} s"
+            finer = f"give an output.sample_interval of {_FINER * interval:.2g} s"
             text = f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
             found.notes["torque_variation"] = text
     elif found.force_rings is not None:
@@ -261,7 +263,7 @@ def _add_force(shown: Shown, found: Lasting, mean: float, variation: float, *, l
         longer = QUARTER * (shown.duration + found.force_rings)
         text = f"the friction force still rings, and torque_variation is missing: run at least {longer:.3g} s"
         found.notes["torque_variation"] = text
-    elif lasts and shown.context.steady and seconds < 0.999 * pattern:
+    elif lasts and shown.context.steady and seconds < _WHOLE * pattern:
         found.notes["torque_variation"] = (
             f"torque_variation needs {pattern:.3g} s, until the waves repeat: run longer"
         )

@@ -11,8 +11,9 @@ from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, WINDOWS, Part, windowed
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LAST, LONGEST, WINDOWS, Part, windowed
 from brakecli.analysis.regime.seen import Seen
+from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
@@ -53,7 +54,7 @@ class Shown:
         self.seen, self.limits, self.track = seen, limits, given.track
         self.samples, self.interval = self.history.samples, self.history.interval
         self.duration = self.samples * self.interval
-        self.half, self.quarter = self.samples // 2, self.samples * (WINDOWS - 10) // WINDOWS
+        self.half, self.quarter = self.samples // 2, self.samples * (WINDOWS - LAST) // WINDOWS
         self.judged_from = seen.settled_from or self.half
 
     def part(self, start: int) -> Part:
@@ -133,7 +134,7 @@ class Shown:
 def _beat(counts: tuple[float, ...]) -> float:
     """Period (s) of the slowest of some waves (Hz), or of the slowest beat of one with a multiple of another."""
     slow = 1.0 / min(counts) if counts else 0.0
-    beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, 11)]
+    beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, MULTIPLES + 1)]
     return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
 
 

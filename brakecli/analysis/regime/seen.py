@@ -9,12 +9,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, FULL, LONGEST, WINDOWS, Part, level_change, tenths
+from brakecli.analysis.regime.evidence import (
+    FEWEST_SAMPLES,
+    FULL,
+    LAST,
+    LONGEST,
+    WINDOWS,
+    Part,
+    level_change,
+    tenths,
+)
 from brakecli.analysis.spectrum import Array
 from brakecli.solver.alike import at_once
 from brakecli.solver.history import History, stacked
 
-_LAST = slice(-10, None)  # windows that give the final values
+_ALIKE = 0.4  # bounds of x over the level of vx, by how far they may leave their final values; a choice
 
 
 class Seen(NamedTuple):
@@ -50,7 +59,7 @@ def _columns(history: History, within: float) -> list[NDArray[Any]]:
     samples = history.samples
     (first, last), whole = tenths(samples), Part(history, 0, samples)
     state = history.read("state", samples - 1, samples)
-    quarter = Part(history, samples * (WINDOWS - 10) // WINDOWS, samples)
+    quarter = Part(history, samples * (WINDOWS - LAST) // WINDOWS, samples)
     parts = Part(history, 0, first), Part(history, last, samples), Part(history, samples // 2, samples), quarter
     columns = [
         state[:, 0],
@@ -63,7 +72,7 @@ def _columns(history: History, within: float) -> list[NDArray[Any]]:
         return columns
     vx, least, largest = _windowed(history)
     final = _final(vx)
-    window = _settled_window((vx, least, largest), within, 0.4 * within)
+    window = _settled_window((vx, least, largest), within, _ALIKE * within)
     columns += [*level_change(vx[:, WINDOWS // 2 :]), final, vx.max(axis=1), window * samples // WINDOWS]
     return columns
 
@@ -93,15 +102,15 @@ def _windowed(history: History) -> tuple[Array, Array, Array]:
 
 def _final(values: Array) -> Array:
     """Means of the last windows."""
-    return np.asarray(np.add.reduce(values[:, _LAST], axis=1) / 10.0)
+    return np.asarray(np.add.reduce(values[:, -LAST:], axis=1) / LAST)
 
 
 def _settled_window(windowed: tuple[Array, Array, Array], within: float, reach: float) -> NDArray[np.int_]:
-    """The windows, never the first, from which on all are settled; 0 where fewer than ten are."""
+    """The windows, never the first, from which on all are settled; 0 where fewer than the last quarter are."""
     vx, least, largest = windowed
     final, span = _final(vx), _final(largest - least)
     settled = np.abs(vx - final[:, None]) <= within * final[:, None]
     for bound in (least, largest):
         settled &= np.abs(bound - _final(bound)[:, None]) <= reach * span[:, None]
     first = np.where(settled.all(axis=1), 1, WINDOWS - settled[:, ::-1].argmin(axis=1))
-    return np.where(first <= WINDOWS - 10, first, 0)
+    return np.where(first <= WINDOWS - LAST, first, 0)

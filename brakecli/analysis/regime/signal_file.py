@@ -35,7 +35,9 @@ _GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _MOST_SAMPLES = 50_000_000
 _CHUNK_NAME = 4  # bytes, of which there are none at the end
-_PLAIN = (1, 3, 0xFFFE)  # formats of a sound whose samples are numbers
+_INTEGERS, _FLOATS, _EXTENSIBLE = 1, 3, 0xFFFE  # formats of a WAV file whose samples are numbers
+_LARGEST = 1e100  # value: its square, and sums of squares, are still finite
+_GRAMS = 1e-3  # kg: a `g` is read as a gram, and means the acceleration of gravity
 _PART = "give a part of the record"
 _NEAREST, _FARTHEST = 1e-12, 1e12  # s between samples
 _GAP = 1.5  # steps of this many times the usual one are gaps
@@ -125,7 +127,7 @@ def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> 
             raise UsageError(f"{name}: {another}; leave the option out")
         found = given
     size, base = found or (1.0, "")
-    if base == "kilogram" and size > 1e-3:
+    if base == "kilogram" and size > _GRAMS:
         what = f"acceleration is in m/s^2 or g, not in kilograms; correct the unit, or {argument('quantity')}"
         raise UsageError(what) if option else UnreadableResultError(what)
     return size * _GRAVITY if base == "kilogram" else size
@@ -163,7 +165,7 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
             f"{'>' if data[:4] == b'RIFX' else '<'}HHQHH", data, place
         )
         held = f"{channels} channels of {bits} bits are in blocks of {block} bytes"
-        damaged = kind in _PLAIN and not 0 < channels * bits <= 8 * block
+        damaged = kind in (_INTEGERS, _FLOATS, _EXTENSIBLE) and not 0 < channels * bits <= 8 * block
         _require(not damaged, f"its header contradicts itself, as {held}; name an intact WAV file")
     try:
         with warnings.catch_warnings():
@@ -235,7 +237,7 @@ def _numbers(values: Array) -> Array:
     _require(len(numbers) > 0, "the column holds no numbers; name another column")
     _require(len(numbers) > 1, "there is only one sample; measure longer")
     limit = "values beyond 1e100 cannot be measured; name another column, or use SI units"
-    _require(np.abs(numbers).max() <= 1e100, limit)
+    _require(np.abs(numbers).max() <= _LARGEST, limit)
     _require(np.ptp(numbers) != 0.0, f"the signal is constant, all values are {numbers[0]:g}; name another column")
     return np.where(good, values, np.nan)
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.cleaning import CERTAIN, Velocity
-from brakecli.analysis.regime.evidence import level_change
+from brakecli.analysis.regime.evidence import WINDOWS, level_change
 from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
 from brakecli.analysis.regime.spectra import line_share
 from brakecli.analysis.regime.stick import Slips
@@ -17,6 +17,16 @@ from brakecli.analysis.spectrum import Array, interpolated
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
 _SHORTEST_PLATEAU = 0.03  # of the time
+_WIDTHS: tuple[float, ...] = 0.02, 0.01, 0.005  # half widths of a plateau that are tried, over the amplitude
+_NEXT = 3.0  # times that width: what lies within is next to a plateau
+_BIN = 0.01  # of the amplitude, in which the most frequent velocities are counted
+_TAIL = 0.01  # of the time, in which the velocity may go beyond its range
+_SLOWER, _FASTER = 0.95, 1.2  # least and largest velocity, over the belt's, that reaches the belt's just so
+_WINDOW_CYCLES = 3.0  # fewer cycles in a window do not have a level
+_FEWEST_WINDOWS = 10  # from which on a level has an error, which takes ten batches
+_MOST_HIDDEN = 0.2  # part of a level that noise may hide: beyond, what has died is not told from what lasts
+_OVERTONES = np.arange(3, 9)  # multiples of a line that two lines in step lack
+_APART = 0.03  # part of an overtone within which its line is sought
 
 
 class Heard:
@@ -38,7 +48,7 @@ class Heard:
     @property
     def windows(self) -> int:
         """How many windows hold three cycles or more each."""
-        return int(np.clip(self.cycles / 3.0, 1, 40))
+        return int(np.clip(self.cycles / _WINDOW_CYCLES, 1, WINDOWS))
 
     def amplitude(self, begin: float) -> float:
         """Half of peak to peak of the displacement, from some part of the record on."""
@@ -58,11 +68,11 @@ class Heard:
 
     def level(self) -> dict[str, Any]:
         """Whether it lasts."""
-        velocity, windows = self.velocity, max(self.windows, 10)
+        velocity, windows = self.velocity, max(self.windows, _FEWEST_WINDOWS)
         levels = velocity.levels(self.smoothing, 0, windows)
         largest = max(float(np.sort(levels)[-3]), 1e-300)
         died_to = float(levels[-(windows // 4) :].mean()) / largest
-        hidden = min(0.2, 0.5 * float(np.sqrt(velocity.noise_at(self.smoothing))) / largest)
+        hidden = min(_MOST_HIDDEN, 0.5 * float(np.sqrt(velocity.noise_at(self.smoothing))) / largest)
         least = max(self.limits.negligible, hidden) * largest
         for steady_from in (0.0, 0.5):
             there = velocity.levels(self.smoothing, int(steady_from * self.samples), windows)
@@ -75,13 +85,13 @@ class Heard:
 
     def harmony(self) -> dict[str, float]:
         """Parts of the energy that tell lines in step from stick."""
-        total, n = max(float(self.power.sum()), 1e-300), np.arange(3, 9)
-        first, last = (0.97 * n * self.strongest).astype(int), (1.03 * n * self.strongest).astype(int) + 2
+        total = max(float(self.power.sum()), 1e-300)
+        first, last = (((1.0 + off) * _OVERTONES * self.strongest).astype(int) for off in (-_APART, _APART))
         turn = 2.0 * np.pi * min(4.0 * self.cycles / self.samples, 0.5)
         gain = 1.0 if self.velocity.measured else 2.0 - 2.0 * np.cos(turn)
         noise = CERTAIN * self.samples * self.velocity.noise**2 * gain
         return {
-            "overtones": sum(float(self.power[i:j].sum()) for i, j in zip(first, last, strict=True)) / total,
+            "overtones": sum(float(self.power[i:j].sum()) for i, j in zip(first, last + 2, strict=True)) / total,
             "beyond_lines": 1.0 - line_share(self.lines),
             "noise_share": min(float(noise) / total, 1.0),
             "line_share": line_share(self.power),
@@ -92,25 +102,25 @@ class Heard:
         finer, mean = int(np.ceil(_FINE * self.cycles / self.samples)), self.velocity.mean
         clean = self.clean[: _PLATEAU_SAMPLES // finer]
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
-        reach = 0.5 * float(np.ptp(np.quantile(clean, [0.01, 0.99]))) or 1.0
+        reach = 0.5 * float(np.ptp(np.quantile(clean, [_TAIL, 1.0 - _TAIL]))) or 1.0
         levels = np.array([self.belt, -self.belt]) - mean
         if not math.isfinite(self.belt):
             # the most frequent values of the lower and of the upper quarter of the range
-            edges = clean.min() + 0.01 * reach * np.arange(float(np.ptp(clean)) / (0.01 * reach) + 2.0)
+            edges = clean.min() + _BIN * reach * np.arange(float(np.ptp(clean)) / (_BIN * reach) + 2.0)
             counts, quarter = np.histogram(clean, edges)[0], max(1, len(edges) // 4)
             places = np.array([np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])])
             levels = 0.5 * (edges[places] + edges[places + 1])
         times = [(0.0, 1.0)]  # at a level, and next to it
-        for level, width in product(levels, (0.02, 0.01, 0.005)):
+        for level, width in product(levels, _WIDTHS):
             away = np.abs(clean - level) / reach
             if (there := float(np.mean(away <= width))) >= _SHORTEST_PLATEAU:
-                times.append((there, float(np.mean(away <= 3.0 * width)) - there))
+                times.append((there, float(np.mean(away <= _NEXT * width)) - there))
         top, beside = max(times, key=lambda time: time[0] / max(time[1], 1e-9))
-        least, most = np.quantile(self.clean + mean, [0.01, 0.99])
+        least, most = np.quantile(self.clean + mean, [_TAIL, 1.0 - _TAIL])
         return {
             "plateau": top / max(beside, 1e-9),
             "sticks": max(0.0, top - 0.5 * beside),
-            "reaches": any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)),
+            "reaches": any(_SLOWER * self.belt <= v <= _FASTER * self.belt for v in (-least, most)),
         }
 
 

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from brakecli.analysis.spectrum import Array
 
+MULTIPLES = 10  # of a passing frequency that are its lines
+_BANDS, _WIDE = 3, 1.06  # strongest bands, each from its peak over this to its peak times this
 _MOST_PAIRED = 2000  # waves; sums of two are lines where there are no more
 
 
@@ -20,9 +22,9 @@ def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
 def line_share(power: Array) -> float:
     """Part of the energy in the three strongest bands, each 6 % to either side."""
     left, total, found = power.copy(), float(power.sum()), 0.0
-    for _ in range(3):
+    for _ in range(_BANDS):
         peak = int(np.argmax(left))
-        band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
+        band = slice(int(peak / _WIDE), int(peak * _WIDE) + 2)
         found += float(left[band].sum())
         left[band] = 0.0
     return found / total if total > 0.0 else 0.0
@@ -36,6 +38,7 @@ def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest:
     """
     base = abs(belt_speed) * np.array(waves_per_metre)
     few = base[: len(base) * (len(base) <= _MOST_PAIRED)]
-    found = [np.outer(np.arange(1, 11), base), np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
+    multiples = np.outer(np.arange(1, MULTIPLES + 1), base)
+    found = [multiples, np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
     lines = np.unique(np.concatenate([each.ravel() for each in found]))
     return tuple(lines[(lines > 0.0) & (lines <= highest)].tolist())

@@ -12,14 +12,17 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from brakecli.analysis.regime.cleaning import Velocity
+from brakecli.analysis.regime.cleaning import DEVIATION, Velocity
 from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
 from brakecli.analysis.regime.spectra import rises
 from brakecli.analysis.spectrum import Array
 
 _PARTS = 7
 _BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
-_FEWEST = 10
+_FEWEST = 10  # slips, below which their shape is not looked at
+_FEWEST_STRONG = 3
+_SURE = 4.0  # standard errors and deviations of noise, which chance does not reach
+_AGAIN = 0.25  # of the velocity in stick, in the other direction, beyond which a slip has begun
 _STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
 _LASTS = 0.55  # least part of a slip that is left a quarter of a cycle later
@@ -66,7 +69,7 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     found, sign, scale = 0.0, 1.0, velocity.quiet
     for m, _ in velocity.scales:
         skewness = _skewness(velocity.thinned(m))
-        if abs(skewness) > max(found, 4.0 * np.sqrt(6.0 * m / len(velocity.values))):
+        if abs(skewness) > max(found, _SURE * np.sqrt(6.0 * m / len(velocity.values))):
             found, sign, scale = abs(skewness), -np.sign(skewness), m
     scale = scale if found >= certain else velocity.quiet
     chosen = replace(velocity, values=sign * velocity.values)
@@ -76,9 +79,9 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     if not len(bulk):
         return Slips(found)
     middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
-    spread = middle + _BULK * 1.4826 * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
-    high = max(0.5 * middle, 4.0 * noise, spread)
-    places = rises(-values, -0.25 * middle, high)
+    spread = middle + _BULK * DEVIATION * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
+    high = max(0.5 * middle, _SURE * noise, spread)
+    places = rises(-values, -_AGAIN * middle, high)
     slips = Slips(found, scale, places, stick=float(np.mean(values > -high)))
     return _shaped(slips, chosen) if slips.count >= _FEWEST else slips
 
@@ -96,7 +99,7 @@ def _shaped(slips: Slips, velocity: Velocity) -> Slips:
     # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
     starts, depths = _falls(uniform_filter1d(x, 1 + scale // 2), slips.places, scale)
     strong = depths >= _STRONG * np.sort(depths)[-min(_FEWEST, len(depths)) :][0] if len(depths) else depths > 0.0
-    if strong.sum() < 3:
+    if strong.sum() < _FEWEST_STRONG:
         return slips
     lasts = _lasting(x, starts[strong], scale) / max(float(depths[strong].mean()), 1e-300)
     returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
@@ -107,7 +110,7 @@ def _shaped(slips: Slips, velocity: Velocity) -> Slips:
 
 def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.intp], Array]:
     """Where the displacement falls most behind each place, and by how much."""
-    falls = sliding_window_view(x[:-scale] - x[scale:], 5 * scale)
+    falls = sliding_window_view(x[:-scale] - x[scale:], _AROUND * scale)
     near = falls[places[places < len(falls)]]
     return places[: len(near)] + near.argmax(axis=1), near.max(axis=1)
 
@@ -115,7 +118,7 @@ def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.i
 def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
     """How far the velocity swings the other way after slips, over them; both beyond what it does between slips."""
     near, waits = (x[fine:] - x[:-fine]) / fine, np.diff(starts)
-    wide = int(min(max(5 * scale, 0.125 * len(x) / len(starts)), 0.4 * np.median(waits))) + 1
+    wide = int(min(max(_AROUND * scale, 0.125 * len(x) / len(starts)), 0.4 * np.median(waits))) + 1
     long = waits >= np.median(waits)
     between = starts[:-1][long] + waits[long] // 2
     exact = sliding_window_view(near, 2 * scale)

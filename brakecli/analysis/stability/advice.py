@@ -15,7 +15,7 @@ from pydantic import ValidationError
 from brakecli.analysis.stability.edges import edges
 from brakecli.analysis.stability.modes import growth
 from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction
-from brakecli.analysis.stability.search import bisect
+from brakecli.analysis.stability.search import HALVINGS, bisect
 from brakecli.case.case import Case
 from brakecli.case.read import put
 from brakecli.case.system import system_of
@@ -32,6 +32,10 @@ _DECOUPLED = 0.0  # °, where a link does not couple x and y: a shoe may be stab
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
 _STEP, _ROUGH_STEP = 1e-3, 0.1  # of a derivative, as a part of the value; averages over roughness are noisy
 _ROUNDING = 1e-12  # of an answer
+_FARTHER = 1.2  # times the critical friction: up to there a changed case is searched for its own
+_ROOM, _LEAST_ROOM = 1.01, 0.01  # a search for the critical friction goes on so far beyond what has to be safe
+_NEARBY = 1e-6  # of the way from the value before: a bisection that ends so close to 0° has found 0°
+_FEWEST_DIGITS, _MOST_DIGITS = 4, 16  # of advice; 17 are all that a number has
 _SURE = 0.05  # largest relative error of a derivative; beyond it there is none, as where the answer jumps
 
 Path = tuple[str, ...]
@@ -152,7 +156,7 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
     if path[0] in _IDLE:
         zero = None if critical is None else 0.0
         return Sensitivity(parameter, value, zero if at else None, zero, zero, 0.0)
-    up_to = min(LARGEST_FRICTION, 1.2 * critical) if critical else case.friction.coefficient + 0.1
+    up_to = min(LARGEST_FRICTION, _FARTHER * critical) if critical else case.friction.coefficient + 0.1
 
     @cache
     def found(x: float) -> Answer | None:
@@ -188,14 +192,14 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         slower = changed(there, ("friction", "coefficient"), least) if there else None
         if there is None or slower is None or (_rough(case) and _grows(slower)):  # a search takes long there
             return False
-        reached = answer(there, 1.01 * least + 0.01)
+        reached = answer(there, _ROOM * least + _LEAST_ROOM)
         return reached is not None and reached.safe(least) and _is_pressed(there, least)
 
     def last(there: float, beyond: float) -> float:
         """The last safe value on the way from one that is to one that is not."""
         if there < beyond:
-            return bisect(safe, there, beyond, halvings=45)[0]
-        return bisect(lambda x: not safe(x), beyond, there, halvings=45)[1]
+            return bisect(safe, there, beyond, halvings=HALVINGS)[0]
+        return bisect(lambda x: not safe(x), beyond, there, halvings=HALVINGS)[1]
 
     inner = {each for each in (*decoupled, *_edges(case, path, value, margin)) if low < each < high}
     ordered = sorted({low, high, value, *inner})
@@ -207,7 +211,7 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
             continue
         before = way[number - 1].value
         to, until = last(there, before), None
-        if there in decoupled and abs(to - there) < 1e-6 * abs(before - there):
+        if there in decoupled and abs(to - there) < _NEARBY * abs(before - there):
             to = there
         if value == 0.0 and not decoupled:  # the least value may be as small as one likes
             to = max(to, min(there, _LEAST * high))
@@ -257,12 +261,12 @@ def _distance(parameter: str, start: float, to: float) -> float:
 
 
 def _shown(to: float, up: bool, safe: Callable[[float], bool]) -> str:
-    """A safe value in four digits, rounded onwards, or in as many as it takes to be safe."""
-    texts = (rounded(to, up, digits) for digits in range(4, 17))
+    """A safe value in few digits, rounded onwards, or in as many as it takes to be safe."""
+    texts = (rounded(to, up, digits) for digits in range(_FEWEST_DIGITS, _MOST_DIGITS + 1))
     return next((text for text in texts if safe(float(text))), repr(to))
 
 
-def rounded(value: float, up: bool, digits: int = 4) -> str:
+def rounded(value: float, up: bool, digits: int = _FEWEST_DIGITS) -> str:
     """A number in so many digits, rounded up or down."""
     unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - digits) if value else 1.0
     return f"{unit * (math.ceil if up else math.floor)(value / unit):.{digits}g}"

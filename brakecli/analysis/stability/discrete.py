@@ -9,13 +9,14 @@ from numpy.typing import NDArray
 
 from brakecli.solver.contact.closed_form import evaluate as closed_form
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.method import MOST, Method
+from brakecli.solver.method import MOST_EVALUATIONS, Method
 from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import SteppingModule
 from brakecli.solver.system import System
 
 RESOLVED = 20  # steps per period, and per passing wave, below which a warning names the number
+DIFFERENCE = 1e-3  # of the static compression: what the matrix of a step is the quotient of
 
 
 @dataclass(frozen=True)
@@ -61,7 +62,6 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     from brakecli.solver.implicit_step import newton  # its kernels are compiled only where they are needed
 
     layer = build_layer(closed_form, build_pad(contact_stiffness, 0.5, surface(), surface(), 0))
-    small = 1e-3
     # y = -1, x = 0 is the equilibrium under a load of the size of the contact stiffness.
     loaded = c._replace(sin_beta=c.c_xy / contact_stiffness + c.phi, cos_beta=1.0 + c.c_yy / contact_stiffness)
     scales = [1.0 / s.h if name in scheme.VELOCITIES else 1.0 for name in scheme.MEMORY]
@@ -74,12 +74,12 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
         if moved is not None:
             state[moved] += by
         scheme.prepare(loaded, s, state, problem)
-        newton(layer, problem, MOST["newton"])
+        newton(layer, problem, MOST_EVALUATIONS["newton"])
         scheme.finish(loaded, s, state, problem, layer.contact, new(WORK))
         return np.array([state[name] for name in scheme.MEMORY]) / scales
 
-    neighbours = [step(name, small * scale) for name, scale in zip(scheme.MEMORY, scales, strict=True)]
-    matrix: NDArray[np.float64] = (np.array(neighbours) - step()).T / small
+    neighbours = [step(name, DIFFERENCE * scale) for name, scale in zip(scheme.MEMORY, scales, strict=True)]
+    matrix: NDArray[np.float64] = (np.array(neighbours) - step()).T / DIFFERENCE
     matrix.flags.writeable = False
     return matrix
 

@@ -34,7 +34,10 @@ from brakecli.solver.system import System
 _BEYOND = 64.0  # times as long as the run
 _DENSE, _MOST_DENSE = 128, 1024  # blocks of time for each wave at most, and times in each of them
 _SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
-_NEAR: Array = np.linspace(-1.0, 1.0, 33) / 8.0  # periods of the fastest wave: a block has a time in each eighth
+_PER_PERIOD = (
+    8.0  # times of a block in a period of the fastest wave; a choice, which 33 times near the best refine
+)
+_NEAR: Array = np.linspace(-1.0, 1.0, 33) / _PER_PERIOD
 _HIGHEST = 32  # blocks that are looked at so closely
 _FEW = 32  # blocks of one product, which is so small that it wakes no threads
 _ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
@@ -165,12 +168,12 @@ def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Compl
     Where so many blocks do not fill the span, they are scattered over it. The third are both parts of the second.
     """
     speeds, size = 2.0 * math.pi * np.array(frequencies), min(_DENSE * len(frequencies), _MOST_DENSE)
-    apart = 0.125 / max(map(abs, frequencies))
+    apart = 1.0 / (_PER_PERIOD * max(map(abs, frequencies)))
     count = min(size, _FEW * math.ceil(span / (apart * size * _FEW)))
     filled = apart * size * count >= span
     size = min(size, math.ceil(span / (apart * count)))
     begins = span * (np.arange(count) / count if filled else _SCATTERED[:count])
-    times = (begins, apart * np.arange(size), 8.0 * apart * _NEAR)
+    times = (begins, apart * np.arange(size), _PER_PERIOD * apart * _NEAR)
     first, turns, near = (np.exp(1j * np.outer(speeds, each)) for each in times)
     return first, turns, np.concatenate([turns.real, turns.imag], dtype=np.float32), near
 

@@ -18,6 +18,8 @@ from brakecli.solver.records import Coefficients
 
 Complex = NDArray[np.complex128]
 Tensor = tuple[Any, Any, Any]
+_MOVES = 1e-12  # of y: an x below that is rounding
+_REAL = 1e-9  # of a root: an imaginary part below that is rounding, of which double roots have its square root
 
 
 @dataclass(frozen=True)
@@ -134,7 +136,7 @@ def first_mode(values: Complex, vectors: Complex) -> Mode:
 
 def _mode(value: Any, vector: Complex) -> Mode:
     value += 0.0  # without -0
-    moves = abs(vector[0]) > 1e-12 * abs(vector[1])
+    moves = abs(vector[0]) > _MOVES * abs(vector[1])
     ratio = vector[1] / vector[0] if moves else 0.0
     shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
     damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
@@ -207,4 +209,4 @@ def _positive_roots(coefficients: NDArray[np.float64]) -> list[float]:
     if scale == 0.0:
         return []
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients / scale, "b"))
-    return [float(root.real) for root in roots if abs(root.imag) <= 1e-9 * abs(root) and root.real > 0.0]
+    return [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root) and root.real > 0.0]

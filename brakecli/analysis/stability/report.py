@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.stability.discrete import spectral_radius
+from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
 from brakecli.analysis.stability.modes import (
     Complex,
     Crossing,
@@ -28,8 +28,14 @@ from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
 FRICTION_STEP = 0.025
+FRICTIONS = 41  # values among which a scheme is asked where it loses stability, by 0.25 where nothing is known
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
+_GROWS = 1e-9  # growth (1/s) over the highest natural frequency (Hz), below which it is rounding
+_DECAYS = 1e-12  # growth over the largest eigenvalue (both 1/s), up to which dashpots have it decay
+_LOCATED = 1e-12  # error of the friction at which a scheme loses stability
+_HALVINGS = 50  # of a step of friction, after which neighbouring numbers are left
+_STEP_HALVINGS = 60  # of the same for a step in time
 
 StiffnessAt = Callable[[float], float]
 
@@ -121,7 +127,7 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
     k = stiffness_at(c.phi)
     if not k > 0.0:
         return None
-    grows = growth(c, k, c.grip(system.belt_speed)) > 1e-9 * natural_frequencies(c, k)[1]
+    grows = growth(c, k, c.grip(system.belt_speed)) > _GROWS * natural_frequencies(c, k)[1]
     return 0.0 if grows else None
 
 
@@ -134,7 +140,7 @@ def is_stable(system: System) -> bool | None:
 
 
 def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
-    tolerance = 0.0 if is_undamped(c) else 1e-12 * float(np.abs(eigenvalues).max())
+    tolerance = 0.0 if is_undamped(c) else _DECAYS * float(np.abs(eigenvalues).max())
     return bool(eigenvalues.real.max() <= tolerance)
 
 
@@ -190,7 +196,7 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up
         if before is None or before == after or (before and after is None):
             continue
         # By halves: without dashpots the growth is zero on one side.
-        low, high = bisect(lambda phi: unstable(phi) == before, low, high, halvings=50)  # noqa: B023 - used at once
+        low, high = bisect(lambda phi: unstable(phi) == before, low, high, halvings=_HALVINGS)  # noqa: B023 - used at once
         lost = unstable(high) is not False
         mode = first_mode(high if lost else low)
         frequency = mode.frequency if mode else 0.0
@@ -226,9 +232,10 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
 
     if excess(0.0) > 0.0:
         return 0.0
-    for low, high in pairwise(np.linspace(0.0, 2.0 * exact.friction if exact else LARGEST_FRICTION, 41).tolist()):
+    highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
+    for low, high in pairwise(np.linspace(0.0, highest, FRICTIONS).tolist()):
         if excess(high) > 0.0:
-            return float(brentq(excess, low, high, xtol=1e-12))
+            return float(brentq(excess, low, high, xtol=_LOCATED))
     return None
 
 
@@ -241,12 +248,12 @@ def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
     omega = 2.0 * math.pi * natural_frequencies(system.coefficients, k)[1]
 
     def is_stable(h: float) -> bool:
-        # Entries of the matrix are rounded to ε (ωh)² / 10⁻³; double eigenvalues are known to the root of that.
-        rounding = math.sqrt(np.finfo(float).eps / 1e-3) * omega * h
+        # Entries of the matrix are rounded to ε (ωh)² over the difference, double eigenvalues to the root of that.
+        rounding = math.sqrt(np.finfo(float).eps / DIFFERENCE) * omega * h
         return spectral_radius(system, k, 0.0, h) <= 1.0 + max(_CLEAR_MARGIN, rounding)
 
     ladder = (10.0 ** np.arange(-2.0, 4.1, 0.25) / omega).tolist()
     if not is_stable(ladder[0]):
         return 0.0
     bracket = next((pair for pair in pairwise(ladder) if not is_stable(pair[1])), None)
-    return bisect(is_stable, *bracket, halvings=60, geometric=True)[0] if bracket else None
+    return bisect(is_stable, *bracket, halvings=_STEP_HALVINGS, geometric=True)[0] if bracket else None

@@ -18,6 +18,7 @@ from numba import boolean, float64, int64, types, void
 from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
 from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
+from brakecli.solver.double_double import EPSILON
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, LAYER, PAD_TYPE, Layer
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.sine import sine_cosine
@@ -35,11 +36,13 @@ _FREE, _MONOTONE, _PLACE, _PER_CELL = 0, 1, 2, 3
 """Readings of the odometers up to which a cell has no root, and up to which the gap is monotone in it; the sign of
 the gap where it has no root, otherwise the root (m)."""
 
-_EPSILON = 2.220446049250313e-16
 _SURE, _ROUND, _SLACK = 0.999, 1e3, 1e-12
 """What is taken of a bound; after how many heights of the roughness an odometer begins anew, and its rounding by
 then, over that height."""
 _NEAR = 0.5  # rad, below which the sine of a difference is not taken from sines
+_MOST_STEPS, _ROUNDED = 100, 2e-16  # of a search for a root, and the last of them over where it is
+_FOLLOWING = 6  # steps of Halley's iteration, after which the root is searched for
+_WIDER = 4.0  # half widths of a part of a cell that is known, which the next part is wide
 _FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it is exact
 
 
@@ -64,7 +67,7 @@ def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, floa
 def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Floats) -> float:
     """The root of a gap that is monotone on [left, right] and changes sign: Newton inside the bracket."""
     xi = 0.5 * (left + right)
-    for _ in range(100):
+    for _ in range(_MOST_STEPS):
         gap, slope, _, _ = _gap(xi, y, n, waves)
         if (gap > 0.0) == (at_left > 0.0):
             left = xi
@@ -73,7 +76,7 @@ def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Fl
         new = xi - gap / slope if slope != 0.0 else left
         if not (left < new < right):
             new = 0.5 * (left + right)
-        if abs(new - xi) <= 2e-16 * max(abs(left), abs(right)):
+        if abs(new - xi) <= _ROUNDED * max(abs(left), abs(right)):
             return new
         xi = new
     return xi
@@ -86,7 +89,7 @@ def _followed(left: float, right: float, xi: float, y: float, n: int, waves: Flo
     ξ becomes ξ - g g'/(g'² - g g''/2). NaN where the root does not lie inside, or is not found at once.
     """
     small = _FOLLOWED * (right - left)
-    for _ in range(6):
+    for _ in range(_FOLLOWING):
         gap, slope, second, _ = _gap(xi, y, n, waves)
         bent = slope * slope - 0.5 * gap * second
         step = gap * slope / bent if bent > 0.0 else math.inf
@@ -206,14 +209,14 @@ def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Float
                 _turn(at_end > 0.0, root, y, pad, waves, contact)
                 if whole:
                     waves[at + _PLACE] = root
-                begin, width = end, 4.0 * half
+                begin, width = end, _WIDER * half
                 continue
             free = min(abs(gap), abs(at_end))
         _turn(gap > 0.0, begin, y, pad, waves, contact)
         if whole:
             waves[at + _FREE] = moved + _SURE * (free - rounding) - slack
             waves[at + _PLACE] = 1.0 if gap > 0.0 else -1.0
-        begin, width = end, 4.0 * half
+        begin, width = end, _WIDER * half
 
 
 @kernel(void(float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
@@ -264,7 +267,7 @@ def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
             place = at + _CELLS + _PER_CELL * cell
             waves[place + _FREE] = waves[place + _MONOTONE] = -1.0
     waves[at + _MOVED], waves[at + _TURNED], waves[at + _HEIGHT], waves[at + _START] = moved, turned, y, math.inf
-    waves[at + _FOURTH], waves[at + _ROUNDING] = fourth, _EPSILON * rounding
+    waves[at + _FOURTH], waves[at + _ROUNDING] = fourth, EPSILON * rounding
 
 
 @kernel(EVALUATE)

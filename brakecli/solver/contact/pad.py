@@ -20,24 +20,31 @@ TILE, BESIDE = 72, 3
 
 MOST_SUMMED = 10
 """Waves of the wheel up to which their sums at all nodes are as fast as a window."""
-ROWS, POINTS, INTERPOLATED = (1, 2, 4, 8, 16), 12, 1e-15
+ROWS: tuple[int, ...] = 1, 2, 4, 8, 16
+POINTS, INTERPOLATED = 12, 1e-15
 """Of windows: points of the grid to a node; points that a height is interpolated from; the largest error of that
 over the sum of amplitudes, which is rounding."""
 
-MOST_CELLS = 2**16
-"""Cells of the pad of which the exact contact keeps what it has found."""
+FEWEST_CELLS, CELLS_PER_WAVE, MOST_CELLS = 8.0, 4.0, 2**16
+"""Cells of the pad of which the exact contact keeps what it has found: at least, for each of the shortest waves,
+and at most."""
+BOUND_POINTS, MOST_BOUND_POINTS = 64, 10**6
+"""Points for each of the shortest waves at which the shoe's profile is bounded, and all of them at most."""
 
 NODES_PER_WAVE = 16
 """Nodes per shortest wavelength that `nodes` is chosen for; measured in tests/solver/test_contact.py."""
+
+NODES = 64
+"""Fewest nodes, of which all numbers of nodes are multiples; a choice."""
 
 PIECE = 100_000
 """Pairs of waves that tables are made of at a time: signals are heard in between."""
 
 
 def default_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
-    """Quadrature nodes for the shortest wavelength of both surfaces, at least 64, a multiple of 64."""
+    """Quadrature nodes for the shortest wavelength of both surfaces, a multiple of `NODES`."""
     waves = 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0)
-    return 64 * max(1, math.ceil(NODES_PER_WAVE * waves / 64 - 1e-9))
+    return NODES * max(1, math.ceil(NODES_PER_WAVE * waves / NODES - 1e-9))
 
 
 class Pad(NamedTuple):
@@ -58,7 +65,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom
     pad.crest = pad.shoe_bound + pad.wheel_bound
     pad.steep, pad.curved = (np.abs(wheel.g) @ wheel.omega**n for n in (1, 2))
-    cells = max(8.0, 8.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
+    cells = max(FEWEST_CELLS, CELLS_PER_WAVE * 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     pad.cell, pad.cells = 2.0 * half_length / cells, min(math.ceil(cells), MOST_CELLS)
     waves, tiles = wheel.g.size, -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
     pad.edges_at = nodes + 2 * BESIDE + 2 * TILE + 2 * (waves + 7)  # behind what the other evaluators keep
@@ -162,7 +169,9 @@ def _shoe_bounds(a: float, *profile: bytes) -> tuple[float, float]:
     shoe = Surface(*(np.frombuffer(each) for each in profile))
     if shoe.g.size == 0:
         return 0.0, 0.0
-    xi = np.linspace(-a, a, min(1 + 64 * max(1, math.ceil(2.0 * a * max(shoe.turns))), 10**6))
+    xi = np.linspace(
+        -a, a, min(1 + BOUND_POINTS * max(1, math.ceil(2.0 * a * max(shoe.turns))), MOST_BOUND_POINTS)
+    )
     f = height(shoe, xi)
     between = float(np.abs(shoe.g) @ shoe.omega**2) * (xi[1] - xi[0]) ** 2 / 8.0
     crest = float(np.abs(shoe.g).sum())

@@ -28,7 +28,9 @@ _REACH = 0.1  # of the size of a cycle: step of Newton's iteration beyond which 
 _ROUNDS = 6
 _CLOSED = 1e-11  # of the size of a cycle, by which an orbit may fail to close
 _FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
-_BANDS = (0.25, 0.35)  # of the standard deviation of v_x: a whole run counts the rises through one of 0.3
+_UNSURE = 100.0  # times `_CLOSED`, by which returns may differ in any case
+# Of the standard deviation of v_x. A whole run counts the rises through one of 0.3.
+_BANDS: tuple[float, ...] = 0.25, 0.35
 MOST_TURNS = 6  # falls in a cycle
 _MANY = 1000  # more often no phase is entered in a cycle
 
@@ -207,6 +209,6 @@ def closed(c: Coefficients, m: Any, path: Any, o: Any) -> int:
             o.kept[i] -= o.map[i, j] * (s[k, j] - at[j])
     was = sizes(o, s[k, 0] - at[0], s[k, 1] - at[1], s[k, 2] - at[2])
     o.away = sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
-    if not (sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + 100.0 * _CLOSED and was < _REACH):
+    if not (sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + _UNSURE * _CLOSED and was < _REACH):
         return 0
     return _around(c, m, path, o) * _around(c, m, path, o)

@@ -25,6 +25,7 @@ from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.steps import look
 from brakecli.solver.schemes.piecewise_exact.switch import place
 from brakecli.solver.system import longest_step
+from brakecli.solver.tangent import MOST_POWERS
 
 GOING_ON, LINEAR, FOUND, ENDED = range(4)
 """What `seek` has come to: nothing yet; no event can follow; an orbit; the end of the time, or of the progress."""
@@ -32,6 +33,7 @@ GOING_ON, LINEAR, FOUND, ENDED = range(4)
 FOREVER = 1e300
 """A time (s) that no motion reaches: finite, as a mode that decays does not grow in it at all."""
 
+_FIRST = 3  # falls before an orbit is sought, and between two tries, which grow further apart
 _NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbit is sought
 
 
@@ -46,7 +48,7 @@ def _bound(m: Any, o: Any, seconds: float) -> None:
             real += o.into[0, q, i] * (m.z[i] - o.rest[i])
             imaginary += o.into[1, q, i] * (m.z[i] - o.rest[i])
         powers = max(o.growth[q], 0.0) * seconds
-        size = math.hypot(real, imaginary) * (math.exp(powers) if powers < 700.0 else math.inf)
+        size = math.hypot(real, imaginary) * (math.exp(powers) if powers < MOST_POWERS else math.inf)
         for k in range(3):
             o.bound[k] += size * o.reach[q, k]
 
@@ -71,7 +73,7 @@ def _returned(m: Any, o: Any, fall: float) -> int:
     s[0, 0], s[0, 1], s[0, 2] = m.at[X], m.at[Y], m.at[V_Y]
     o.fell[0], o.lows[0], o.ways[0], o.falls = fall, o.low, o.way, o.falls + 1
     o.low, o.way, o.events = s[0, 0], 0, 0
-    if o.falls < max(o.next_try, 3):
+    if o.falls < max(o.next_try, _FIRST):
         return 0
     low, high = o.lows[0], s[0, 0]
     for k in range(1, min(MOST_TURNS, o.falls - 1) + 1):
@@ -93,7 +95,7 @@ def _try(c: Coefficients, m: Any, path: Any, o: Any) -> int:
         m.z[i] = o.saved[i]
     m.phase, o.way, o.events, o.low = phase, way, events, low
     look(m)
-    o.next_try = o.falls + 3 + (o.falls - o.next_try) // 2
+    o.next_try = o.falls + _FIRST + (o.falls - o.next_try) // 2
     return found
 
 

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
     from brakecli.solver.energy import Mechanical
     from brakecli.solver.records import Coefficients, Pair, Plant, Weights
 
-HALF, QUARTERS, NUMEROV = (0.5, 0.5), (0.25, 0.5, 0.25), (1 / 12, 10 / 12, 1 / 12)
+HALF: tuple[float, ...] = 0.5, 0.5
+QUARTERS: tuple[float, ...] = 0.25, 0.5, 0.25
+NUMEROV: tuple[float, ...] = 1 / 12, 10 / 12, 1 / 12
 
 
 @runtime_checkable

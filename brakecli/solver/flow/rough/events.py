@@ -17,6 +17,9 @@ BOUND = 1e100  # of a state, beyond which the motion has run away
 LANDING = 16  # parts of a step in which the whole pad lands or lifts off: the force has a kink there
 _ROUNDED = 1e-9  # of a step, that may be left of it by rounding
 _SEEKS = 60  # steps of the search for an event
+_ABOVE = 0.75  # of a part at which a margin is negative, the middle of a bracket from its half on
+_CERTAIN, _NARROWEST = 0.01, 1e-16  # of the rounding of a margin, and of a step: ends of that search
+_STRETCHED = 1.5  # times the longest part, up to which the last one is stretched: none is shorter than half of it
 _SIGNALS = 1023  # steps between two looks at signals, plus one a power of two
 _NONE = -1
 _DONE, _TOO_MANY_EVENTS, _NOT_FINITE, _GRAZED, _STOPPED = (int(status) for status in Status)
@@ -60,7 +63,7 @@ def _located(c: Coefficients, f: Any, tables: Floats, h: float, high: float, whi
         for _ in range(_SEEKS):
             part = 0.5 * high
             if _margin_at(c, f, tables, part * h, which) > 0.0:
-                low, part = part, 0.75 * high
+                low, part = part, _ABOVE * high
                 break
             high = part
         if low == 0.0:
@@ -71,7 +74,7 @@ def _located(c: Coefficients, f: Any, tables: Floats, h: float, high: float, whi
             low = part
         else:
             high = part
-        if abs(value) <= 0.01 * noise or high - low <= 1e-16:
+        if abs(value) <= _CERTAIN * noise or high - low <= _NARROWEST:
             break
         slope = h * f.end_margin_rate[which]
         rest = -value / slope if slope < 0.0 else 2.0
@@ -224,7 +227,7 @@ def _begin(c: Coefficients, f: Any, tables: Floats) -> None:
 def _next_part(f: Any, end: float, longest: float) -> float:
     """The length of the next part of a step until some time. The last one ends there, however late it begins."""
     left = max(end - f.since, 0.0)
-    last = left <= 1.5 * longest
+    last = left <= _STRETCHED * longest
     for j in range(COLUMNS):
         f.stretch[j] = -f.late[j] if last else 0.0
     return left if last else longest

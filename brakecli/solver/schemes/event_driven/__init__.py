@@ -7,15 +7,16 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
-from brakecli.solver.automaton import OPEN, STICK, side_of
+from brakecli.solver.automaton import CONE, OPEN, STICK, side_of
 from brakecli.solver.compile import Floats, address, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.friction import observed
 from brakecli.solver.motions import MOTION, V_X, V_Y, X, Y
 from brakecli.solver.quantities import Failure
 from brakecli.solver.records import EVALUATE, Plant, Weights, plant_type
 from brakecli.solver.runge_kutta import interpolated
-from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe, press, resistance
+from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
 from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 from brakecli.solver.tangent import renew
 from brakecli.solver.track import mark
@@ -32,8 +33,10 @@ _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` wo
 address(solve)  # compiled here, like all other kernels of a run: before anything is timed
 
 _BUDGET, _EXACT = 4096, 64
-"""Steps of one call on smooth surfaces, and as how many one counts that finds patches; the square of the number of
-waves adds to both. An interruption need not wait for a sample."""
+"""Steps of one call on smooth surfaces, and as how many one counts that finds patches. An interruption need not
+wait for a sample."""
+_PAIRS, _PAIRS_EXACT = 2000, 3
+"""Pairs of waves that take as long as a step on smooth surfaces, in full contact and where patches are found."""
 
 _NONE, _COARSE = int(Failure.NONE), int(Failure.COARSE)
 
@@ -51,7 +54,7 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     phase = m.phase
     at, x, y, v_x, v_y = m.x, m.x, m.y, m.v_x, m.v_y
     belt, belt_slope, load = m.belt, m.belt_slope, m.load
-    if m.level > level or m.tau > 4.0 * EPSILON * t:
+    if m.level > level or m.tau > ROUNDING * t:
         phase = m.phase_done
         since = (t - m.time_done) - m.tau_done
         theta, rest, belt_slope = since / m.step_done, (m.time - t) + m.tau, m.belt_slope_done
@@ -66,7 +69,7 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     bound = c.phi * normal
     against_x, _ = resistance(c, load, x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x  # Eq. (6) in stick
-    holds = phase == STICK and abs(needed) <= bound * (1.0 + 1e-12)  # by the rounding of the cone it still sticks
+    holds = phase == STICK and abs(needed) <= bound * CONE
     state, friction = observed(side_of(phase), holds, needed, normal, bound)
     m.row[0], m.row[1], m.row[2], m.row[3] = x, y, v_x, v_y
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
@@ -114,7 +117,11 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         failure: int = _step_at(p.plug.solve)(shoe, drive, grid)
         if p.tangent.beyond == 1:
             failure = _COARSE
-        steps += 1 + waves * waves // 2000 if p.layer.contact.kind == CLOSED_FORM else _EXACT + waves * waves // 3
+        steps += (
+            1 + waves * waves // _PAIRS
+            if p.layer.contact.kind == CLOSED_FORM
+            else _EXACT + waves * waves // _PAIRS_EXACT
+        )
         if failure != _NONE:
             for column in range(rows.shape[1]):
                 rows[row, column] = m.row[column]

@@ -4,11 +4,12 @@ import math
 
 from numba import float64, int64, types
 
-from brakecli.solver.automaton import HEIGHT, OPEN, STICK, side_of
+from brakecli.solver.automaton import HEIGHT, OPEN, SOONER, STICK, side_of
 from brakecli.solver.compile import kernel
+from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.motions import V_X, Y
 from brakecli.solver.runge_kutta import reach
-from brakecli.solver.schemes.event_driven.phases import EPSILON, NEAR, SHOE, Shoe, margins, rounding
+from brakecli.solver.schemes.event_driven.phases import NEAR, SHOE, Shoe, margins, rounding
 
 NONE = -1
 LOOKS = 8
@@ -19,17 +20,25 @@ _BESIDE = 1e-3
 """Part of a step over which a margin rises or falls at its ends."""
 _APART = 0.05
 """Part of a step between the places of a parabola."""
-_GOLDEN = 0.3819660112501051
+_GOLDEN, _GOLDEN_STEPS = 0.3819660112501051, 40
+"""Part of a bracket at which it is divided, and how often: to 1e-8 of itself, and 1e-16 in the value."""
+_SECANTS, _MOST_STEPS = 20, 100
+"""Steps of the search for a root by secants, after which brackets are halved, and all of them."""
+_SOUGHT = 8
+"""Places at which a margin that begins at zero is sought above it."""
+_FALLS = 7.0
+"""Rise², over bend and height in the middle, beyond which a parabola falls to an eighth of that: it falls by
+rise² / (8 bend), and 8 (1 - 1/8) = 7."""
 
 
 @kernel(types.UniTuple(float64, 3)(SHOE))
 def _allowances(p: Shoe) -> tuple[float, float, float]:
     """How far each margin may be below zero by rounding alone."""
     m = p.motion
-    height = 4.0 * EPSILON * (abs(m.y) + p.layer.pad.clear_from)
+    height = ROUNDING * (abs(m.y) + p.layer.pad.clear_from)
     if m.phase != STICK:
         late = abs(m.belt_slope) * (m.time + m.tau)  # the wheel's velocity at a time that is rounded
-        return height, 4.0 * EPSILON * (abs(m.v_x) + abs(m.belt) + late), 0.0
+        return height, ROUNDING * (abs(m.v_x) + abs(m.belt) + late), 0.0
     along, _ = rounding(p)
     return height, 2.0 * along, 2.0 * along
 
@@ -44,9 +53,9 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
     if low <= 0.0:
         return left
     place, moved = left, 0
-    for turn in range(100):
+    for turn in range(_MOST_STEPS):
         new = left + (right - left) * (low / (low - high))
-        if turn > 20 or not left < new < right:
+        if turn > _SECANTS or not left < new < right:
             new = 0.5 * (left + right)
         if abs(new - place) <= _NEAR * right or right - left <= _NEAR * right:
             return new
@@ -70,7 +79,7 @@ def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[fl
     """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
     a, b = left + _GOLDEN * (right - left), right - _GOLDEN * (right - left)
     at_a, at_b = margins(p, h, a)[which], margins(p, h, b)[which]
-    for _ in range(40):  # to 1e-8 of the bracket, and 1e-16 in the value
+    for _ in range(_GOLDEN_STEPS):
         if at_a < 0.0 or at_b < 0.0:
             break
         if at_a < at_b:
@@ -124,17 +133,16 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                 right = theta
                 if look == 1 and last[which] <= allowed[which]:  # it begins at zero: where is it positive?
                     left = theta
-                    for _ in range(8):
-                        left *= 0.125
+                    for _ in range(_SOUGHT):
+                        left *= SOONER
                         if margins(p, h, left)[which] > allowed[which]:
                             break
                     else:
                         return which, 0.0
             elif look == 1 and allowed[which] < last[which] <= now[which]:
                 dip, until = 0.0 if margins(p, h, _BESIDE)[which] < last[which] else -1.0, theta
-            elif (
-                before_last[which] > last[which] <= now[which]
-                and rise * rise > 7.0 * bend * (last[which] - near)  # it falls to an eighth of the middle
+            elif before_last[which] > last[which] <= now[which] and rise * rise > _FALLS * bend * (
+                last[which] - near
             ):
                 dip, until = theta - 2.0 / LOOKS, theta
             if right == 0.0 and dip < 0.0 and look == LOOKS and now[which] <= last[which]:

@@ -26,6 +26,7 @@ from brakecli.solver.automaton import (
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
+from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.motions import MOTION_TYPE, V_X, V_Y, X, Y
 from brakecli.solver.records import COEFFICIENTS, Coefficients, Drive, Layer
 from brakecli.solver.roughness import turn
@@ -33,7 +34,6 @@ from brakecli.solver.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.schedules import integral_at, slope_at, value_at
 from brakecli.solver.tangent import kept
 
-EPSILON = 2.220446049250313e-16
 NEAR = 3.0
 """Times what the error moves a margin by: one that comes nearer to zero may be an event, or none."""
 
@@ -77,14 +77,14 @@ def rounding(p: Shoe) -> tuple[float, float]:
     along = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + load * abs(c.sin_beta)
     across = abs(c.b_xy) * v_x + c.b_yy * v_y + abs(c.c_xy) * x + c.c_yy * y + load * c.cos_beta
     along += c.m * abs(m.belt_slope) + c.phi * normal
-    return 4.0 * EPSILON * along, 4.0 * EPSILON * (across + normal)
+    return ROUNDING * along, ROUNDING * (across + normal)
 
 
 @kernel(void(SHOE, records.DRIVE), inlined=False)
 def arrive(p: Shoe, drive: Drive) -> None:
     """What acts from outside at the time reached and, as no knot lies inside a step, all through the next step."""
     m, t, tau = p.motion, p.motion.time, p.motion.tau
-    after = t + tau + 4.0 * EPSILON * (t + tau)  # a knot within the rounding of the time has been reached
+    after = t + tau + ROUNDING * (t + tau)  # a knot within the rounding of the time has been reached
     m.belt, m.belt_slope = value_at(drive.belt, t + tau), slope_at(drive.belt, after)
     m.load, m.load_slope = value_at(drive.load, t + tau), slope_at(drive.load, after)
     m.travel, m.travel_low = integral_at(drive.belt, t, tau)

@@ -9,6 +9,7 @@ from brakecli.solver import runge_kutta
 from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
 from brakecli.solver.compile import kernel
 from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.double_double import EPSILON, ROUNDING
 from brakecli.solver.motions import MOTION_TYPE, POWERED, STAGES, V_X, V_Y, X, Y
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.records import DRIVE, GRID, KNOTS, Drive, Grid
@@ -17,7 +18,7 @@ from brakecli.solver.schedules import Schedule, segment
 from brakecli.solver.schemes.event_driven import phases
 from brakecli.solver.schemes.event_driven.error import grow
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
-from brakecli.solver.schemes.event_driven.phases import EPSILON, SHOE, Shoe
+from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
 from brakecli.solver.track import enter, put, turned
 
 _LOCAL = 0.05
@@ -32,14 +33,18 @@ _RADIANS = 2.0
 """Largest angle that the fastest motion turns by in a step, so that the looks at the margins follow it."""
 _DECAY = 4.0
 """Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
-_FIRST = 0.05
-"""The first step over the longest; on nodes five times that."""
+_FIRST, _FIRST_ON_NODES = 0.05, 0.25
+"""The first step over the longest."""
+_MANY_SWITCHES, _CLOSER = 2, 0.1
+"""Phases that end at once, after which the next step is shorter: closer by, one of them does not end."""
 _MOST_SWITCHES = 60
 """A run ends after so many phases that end at once."""
 _LOOSE = 2e-5
 """Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
 _NEAR = 1e-3
-"""The last change of a place on the continuous solution by Newton's iteration, whose error is about its square."""
+"""The last change of a place in a step by Newton's iteration, over the step: what is left is about its square."""
+_CORRECTED = 6
+"""Steps of that iteration, at most."""
 _AGAIN = 8
 """Steps that are made to where an event is, at most."""
 _TINY = 1e-300  # no division by zero where nothing moves
@@ -53,7 +58,7 @@ _NOT_CLOSED = int(Failure.NOT_CLOSED)
 @kernel(float64(KNOTS, float64))
 def _to_knot(s: Schedule, t: float) -> float:
     """Time (s) to the next knot of a schedule; one within the rounding of t has been reached."""
-    k = segment(s, t + 4.0 * EPSILON * abs(t)) + 1
+    k = segment(s, t + ROUNDING * abs(t)) + 1
     return s[k].time - t if k < s.size else math.inf
 
 
@@ -96,7 +101,7 @@ def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
     if m.phase == UNDECIDED:
         phases.take_hold(p)
     phases.find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
-    m.step = (_FIRST if m.light == 0 else 5.0 * _FIRST) * _longest(p, grid.samples * grid.interval)
+    m.step = (_FIRST if m.light == 0 else _FIRST_ON_NODES) * _longest(p, grid.samples * grid.interval)
 
 
 @kernel(float64(SHOE, float64), inlined=False)
@@ -142,7 +147,7 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
                     continue
                 noise = h * (along if tangential else across) / p.c.m
                 floor = noise if i >= V_X else h * noise
-                floor += 4.0 * EPSILON * max(abs(m.begin[i]), abs(m.end[i]))
+                floor += ROUNDING * max(abs(m.begin[i]), abs(m.end[i]))
                 largest = max(m.largest[i], abs(m.end[i]))
                 error = h * runge_kutta.local_error(m, i) / (m.tolerance * largest + floor + _TINY)
                 if not error < math.inf:
@@ -179,7 +184,7 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
         margin = phases.margins(p, h, 1.0)[which]
         slope = phases.margin_slope(p, which)
         rest = -margin / slope if slope != 0.0 else 0.0
-        if abs(rest) <= 1e-3 * h:
+        if abs(rest) <= _NEAR * h:
             for i in range(4):
                 m.end[i] += rest * m.slopes[END_STAGE, i]
             return h + rest
@@ -234,7 +239,7 @@ def _follow(p: Shoe) -> None:
     if kind >= 0:
         first, last = m.begin[V_X], m.end[V_X]
         theta = first / (first - last) if first * last < 0.0 else 0.0
-        for _ in range(6):
+        for _ in range(_CORRECTED):
             velocity, slope = runge_kutta.interpolated_both(m, V_X, theta)
             new = min(max(theta - velocity / slope, 0.0), 1.0) if slope != 0.0 else theta
             theta, moved = new, abs(new - theta)
@@ -317,8 +322,8 @@ def step(p: Shoe, drive: Drive, grid: Grid) -> int:
     which, theta = first_event(p, h)
     if which != NONE and theta == 0.0:
         m.switches += 1
-        if m.switches > 2:  # two phases that both end at once: closer by, one of them does not
-            m.step = 0.1 * h
+        if m.switches > _MANY_SWITCHES:
+            m.step = _CLOSER * h
         if m.switches > _MOST_SWITCHES:
             return _STALLED
         return _enter(p, which, longest)

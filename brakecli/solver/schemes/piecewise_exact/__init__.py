@@ -11,7 +11,7 @@ from typing import Any
 from numba import float64, int64, void
 
 from brakecli.solver import own_steps
-from brakecli.solver.automaton import OPEN, SLIDING, STICK, anchored, carried, counted, side_of, stalled
+from brakecli.solver.automaton import CONE, OPEN, SLIDING, STICK, anchored, carried, counted, side_of, stalled
 from brakecli.solver.compile import Floats, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.friction import observed
@@ -180,7 +180,7 @@ def _sample(p: Plant, t: float) -> None:
     needed = 0.0
     for i in range(SIZE if m.phase == STICK else 0):
         needed += m.needed[i] * z[i]
-    holds = m.phase == STICK and abs(needed) <= c.phi * normal * (1.0 + 1e-12)  # by the rounding it still sticks
+    holds = m.phase == STICK and abs(needed) <= c.phi * normal * CONE
     state, friction = observed(side_of(m.phase), holds, needed, normal, c.phi * normal)
     m.row[0], m.row[1], m.row[2], m.row[3] = z[X], z[Y], z[V_X], z[V_Y]
     m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, 1.0 if normal > 0.0 else 0.0, state

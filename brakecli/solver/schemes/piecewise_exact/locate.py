@@ -4,15 +4,16 @@ from typing import Any
 
 from numba import float64, int64, types
 
-from brakecli.solver.automaton import STICK
+from brakecli.solver.automaton import SOONER, STICK
 from brakecli.solver.compile import kernel
+from brakecli.solver.double_double import EPSILON
 from brakecli.solver.motions import BELT, FLOW_TYPE, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
 
 NO_EVENT = -1
-_EPSILON = 2.220446049250313e-16
-ROUNDING = 8.0 * _EPSILON
+ROUNDING = 8.0 * EPSILON
 """Rounding of a margin over the sum of its terms."""
-_LOOKS = 12  # how often a margin that begins at zero is sought above it, each time in an eighth of the time
+_LOOKS = 12  # how often a margin that begins at zero is sought above it
+_MOST_STEPS = 200  # of a search for a root; halving alone takes 53 from a bracket that does not begin at 0
 
 
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
@@ -31,13 +32,13 @@ def root(m: Any, row: int, left: float, right: float) -> float:
     first = m.polynomial[row, 0] if left == 0.0 else _value(m, row, left)[0]
     last = _value(m, row, right)[0]
     place = left + (right - left) * first / (first - last) if first > 0.0 > last else right
-    for _ in range(200):
+    for _ in range(_MOST_STEPS):
         value, slope = _value(m, row, place)
         if value > 0.0:
             left = place
         else:
             right = place
-        if slope < 0.0 and abs(value) <= -_EPSILON * place * slope:
+        if slope < 0.0 and abs(value) <= -EPSILON * place * slope:
             break
         new = place - value / slope if slope < 0.0 else left
         if not left < new < right:
@@ -88,7 +89,7 @@ def first_event(m: Any) -> tuple[int, float]:
         if start <= allowed:  # it begins at zero: where is it positive?
             left = right
             for _ in range(_LOOKS):
-                left *= 0.125
+                left *= SOONER
                 if _value(m, 0, left)[0] > allowed:
                     break
             else:

@@ -6,6 +6,7 @@ from typing import Any
 from numba import float64, int64, types, void
 
 from brakecli.solver.compile import kernel
+from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.motions import (
     AHEAD,
     BELT,
@@ -26,8 +27,8 @@ from brakecli.solver.tangent import kept
 from brakecli.solver.track import put, turned
 
 _FLAT = 1e-12  # fall of a margin over its rise, by which it dips by 1e-18 of this at most
-_ROUNDING = 4.0 * 2.220446049250313e-16  # of a step, beside the motion
 _NEAR = 0.03  # part of a step by which an iteration of third order may move a turning point at last
+_CORRECTED = 6  # steps of that iteration, at most
 _ERROR_TERMS = 9  # of the series of an error, which is known to a few digits only
 
 Four = tuple[float, float, float, float]
@@ -52,7 +53,7 @@ def _round(m: Any) -> None:
     for i in range(4):
         place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
         drive = abs(a[BELT, i] * belt) + abs(a[LOAD, i] * load)
-        m.error[i] += math.copysign(_ROUNDING * (place + drive), m.error[i])
+        m.error[i] += math.copysign(ROUNDING * (place + drive), m.error[i])
 
 
 @kernel(void(FLOW_TYPE))
@@ -143,7 +144,7 @@ def note_turn(m: Any, track: Any, t: float, span: float, v_before: float) -> Non
         return
     back = -span * z[V_X] / (z[V_X] - v_before) if z[V_X] * v_before <= 0.0 else 0.0
     place = 0.0
-    for _ in range(6):
+    for _ in range(_CORRECTED):
         x, y, v_x, v_y, load, belt_slope = z[X], z[Y], z[V_X], z[V_Y], z[LOAD], z[BELT_SLOPE]
         velocity, slope, bend, power, before = v_x, 0.0, 0.0, 1.0, 0.0
         place = x
