@@ -11,6 +11,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+_LONGEST, _SHOWN = 80, 5  # characters of a value in a message, and entries of a list
 _ODD = {"Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"}  # categories of Unicode
 KeyPath = tuple[str | int, ...]
 """The names of the tables and of the key, from the top of a file on; a number is a place in a list."""
@@ -119,22 +120,22 @@ def value_text(value: object) -> str:
         case bool():
             text = str(value).lower()
         case str():
-            text = json.dumps(value[:80], ensure_ascii=False)
+            text = json.dumps(value[:_LONGEST], ensure_ascii=False)
         case int() if value.bit_length() > 250:
             text = "an integer of more than 75 digits"
         case dict():
             text = "a table"
         case list() | tuple():
-            shown = ["[…]" if isinstance(each, list) else value_text(each) for each in value[:5]]
-            text = f"[{', '.join([*shown, '…'] if len(value) > 5 else shown)}]"
+            shown = ["[…]" if isinstance(each, list) else value_text(each) for each in value[:_SHOWN]]
+            text = f"[{', '.join([*shown, '…'] if len(value) > _SHOWN else shown)}]"
         case _:
             text = str(value)
     return printable(text)
 
 
 def printable(text: str) -> str:
-    """A text in one line of at most 80 characters that a terminal shows as they are."""
-    return escaped(text if len(text) <= 80 else text[:79] + "…")
+    """A text in one line of at most `_LONGEST` characters that a terminal shows as they are."""
+    return escaped(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
 
 
 def escaped(text: str, kept: str = "") -> str:

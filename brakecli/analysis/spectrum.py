@@ -70,7 +70,7 @@ def peak(
     That takes three bins below it, also below the strongest line (Hz) that the whole record shows, and five
     cycles in the duration (s) of the record.
     """
-    if density.size < 3 or not density[1:].max() > 0.0 or strongest < _FEWEST_BINS * frequency[1]:
+    if density.size < _FEWEST_BINS or not density[1:].max() > 0.0 or strongest < _FEWEST_BINS * frequency[1]:
         return None
     i = 1 + int(np.argmax(density[1:]))
     found = interpolated(frequency, density, i)

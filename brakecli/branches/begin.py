@@ -27,8 +27,10 @@ AHEAD = 10_000
 
 SETTLE, SEEN = 400, 8
 """Periods of the mode for which a motion of a rough shoe is left to itself, and in which returns are sought."""
-LOOKS = 60
-"""Places of a period at which the motion is looked at."""
+LOOKS, SOONEST = 60, 12
+"""Places of a period at which the motion is looked at, and after how many it may have returned."""
+PARTS = 4
+"""Parts of a period that a motion left to itself is carried at a time, and places whose return is sought."""
 RETURNS = 0.25
 """Distance, in sizes of the motion, of a state from an earlier one that may be the same."""
 TRIES = 12
@@ -122,10 +124,10 @@ def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Poi
     """The cycle of a rough shoe whose motion returns to itself."""
     flow, rest, period = problem.flow(p), problem.rest(p), 1.0 / frequency
     states = [np.array(state, float)]
-    for k in range(SETTLE * 4 + SEEN * LOOKS):
-        if flow(states[-1], period * (0.25 if k < SETTLE * 4 else 1.0 / LOOKS), False) != DONE:
+    for k in range(SETTLE * PARTS + SEEN * LOOKS):
+        if flow(states[-1], period * (1.0 / PARTS if k < SETTLE * PARTS else 1.0 / LOOKS), False) != DONE:
             return None
-        states = [flow.state] if k < SETTLE * 4 else [*states, flow.state]
+        states = [flow.state] if k < SETTLE * PARTS else [*states, flow.state]
     seen = np.array(states)
     size = 0.5 * float(np.ptp(seen[:, :2], axis=0).max())
     if not size > AT_REST * abs(rest[1]):
@@ -135,9 +137,9 @@ def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Poi
     belt = problem.line.shoe(p).belt
     places = [k for k in range(LOOKS) if abs(seen[k, 2] - belt) > CLEAR * abs(belt)]
     tries = 0
-    for k in places[:: max(len(places) // 4, 1)]:
+    for k in places[:: max(len(places) // PARTS, 1)]:
         away = np.abs((seen - seen[k]) / scales).max(axis=1)
-        for j in range(k + LOOKS // 5, len(seen) - 1):
+        for j in range(k + SOONEST, len(seen) - 1):
             if not (away[j] < RETURNS and away[j - 1] >= away[j] <= away[j + 1]):
                 continue
             tries += 1

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from brakecli.analysis.regime.decision import Thresholds
 from brakecli.errors import escaped
 from brakecli.files import fields
 from brakecli.files.field import Field, named, values_of
@@ -91,7 +92,7 @@ def disturbances(numbers: Mapping[str, Any]) -> list[str]:
     if rate is None or error is None:
         return []
     what = "fade" if rate < 0.0 else "grow"
-    known = "" if abs(rate) > 3.0 * error else ", which is not told from 0"
+    known = "" if abs(rate) > Thresholds.sure_errors * error else ", which is not told from 0"
     return [f"small ones {what} at {abs(rate):.3g} ± {error:.2g} 1/s{known}"]
 
 

@@ -12,6 +12,8 @@ from brakecli.plots import style
 
 _LONGEST_KEY, _MOST_TEXTS, _MOST_CHARACTERS = 45, 30, 70
 _FEW = 6  # values of an axis up to which each has its tick
+_MORE_ALIKE = 0.999  # spread of ratios over that of distances: where both are the same, the axis is linear
+_APART = 0.1  # of an axis: values that are nearer to each other have no tick each
 _LEAST_LOG = 5.0  # ratio of the ends of a logarithmic axis; below it, linear ticks are easier to read
 
 
@@ -32,7 +34,7 @@ class Axis:
         if self.texts is not None or len(values) < 3 or values[0] <= 0.0 or values[-1] < _LEAST_LOG * values[0]:
             return False
         steps, ratios = np.diff(values), np.diff(np.log(values))
-        return bool(np.std(ratios) / np.mean(ratios) < 0.999 * np.std(steps) / np.mean(steps))
+        return bool(np.std(ratios) / np.mean(ratios) < _MORE_ALIKE * np.std(steps) / np.mean(steps))
 
     @property
     def edges(self) -> style.Array:
@@ -80,7 +82,7 @@ class Axis:
             axis.set_ticks(values[::step], labels=texts[::step], parse_math=False, **turned)
             axis.axes.set(**{f"{side}lim": (-0.5, len(texts) - 0.5)})
             axis.grid(False)
-        elif not self.logarithmic and len(values) <= _FEW and np.diff(values).min() > 0.1 * np.ptp(values):
+        elif not self.logarithmic and len(values) <= _FEW and np.diff(values).min() > _APART * np.ptp(values):
             axis.set_ticks(values, labels=[style.readable(factor * float(value), self.digits) for value in values])
         else:
             if self.logarithmic:

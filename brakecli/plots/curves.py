@@ -13,6 +13,7 @@ from brakecli.plots import style, sweep
 from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.windows import Outcome
 
+_FAINT = 30.0  # times as large as the least amplitude on a logarithmic axis is the least of what lasts
 _DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves
 
 
@@ -100,7 +101,7 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     factor, unit = style.prefixed(style.largest(values), unit)
     lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
-    least = max(lasting / 30.0, float(values[values > 0.0].min())) if wide else 0.0
+    least = max(lasting / _FAINT, float(values[values > 0.0].min())) if wide else 0.0
     x, size, small = axis.values, sweep.size_of(len(axis.values)), values < least
     shaken, none = picture["excitation"] == Excitation.FORCED, np.full_like(values, np.nan)
     forced = picture.variables.get(sweep.FORCED_PART, none) if name == "amplitude" else none

@@ -20,8 +20,10 @@ from brakecli.sweeps.record import Status
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
 _MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
 _MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
+_CONTOURED = 0.3  # part of the cells whose corners are known, from which on lines are drawn instead of numbers
+_DARK = 0.6  # part of the colours, from the dark end on, on which numbers are white
 _EMPTY = "#F7F7F7"  # of cells without a value
-_ALIKE = 1e-6  # relative difference of numbers from which on they have different colours
+_ALIKE, _CRITICAL_ALIKE = 1e-6, 1e-2  # relative difference from which on numbers have different colours
 _DOT = 8.0  # points (1/72 inch) across, of a listed point
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
@@ -105,7 +107,7 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
         words = f"critical {critical.parameter}"
         low, high = (low, high) if values.size else (critical.lower, critical.upper)
     largest = max(abs(low), abs(high))
-    if high - low <= (1e-2 if name == "critical" else _ALIKE) * largest:
+    if high - low <= (_CRITICAL_ALIKE if name == "critical" else _ALIKE) * largest:
         low, high = low - (0.01 * largest or 1.0), high + (0.01 * largest or 1.0)
     factor, unit = style.prefixed(largest, unit)
     return Scale(style.labelled(words, unit), Normalize(factor * low, factor * high), factor)
@@ -172,14 +174,14 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     known = np.isfinite(values)
     areas = known[1:, 1:] & known[:-1, 1:] & known[1:, :-1] & known[:-1, :-1]
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
-    if numeric and np.mean(areas) > 0.3:
+    if numeric and np.mean(areas) > _CONTOURED:
         _draw_contours(axes, picture, values, scale.norm)
         return mesh
     width = axes.get_window_extent().width / axes.figure.dpi
     if values.size <= _MOST_NUMBERS and width > _LEAST_CELL * len(values):
         for i, j in np.argwhere(known):
             x, y, value = picture.axes[0].values[i], picture.axes[1].values[j], values[i, j]
-            colour = "white" if scale.norm(value) < 0.6 else "black"
+            colour = "white" if scale.norm(value) < _DARK else "black"
             axes.text(x, y, f"{value:.4g}", ha="center", va="center", size=8.0, color=colour)
     return mesh
 

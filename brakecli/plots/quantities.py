@@ -17,6 +17,7 @@ VARIABLES = {  # what `--variable` may name: words, words at the axis with the s
     "torque": ("braking torque", "braking torque $R F_x$", "$R F_x$", "N m"),
     "contact_fraction": ("part of the pad that touches", "touching part of the pad", "the touching part", ""),
 }
+CENTRED = 0.02  # of the middle of values: if they move by less, the axis counts from a centre
 STILL = 1e-6  # of the whole run's motion: a smaller one is drawn as a line
 
 
@@ -54,7 +55,7 @@ def scaled(variable: str, values: style.Array, whole: style.Array, also: float =
 def _centre(values: style.Array) -> float:
     """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
     middle, width = 0.5 * float(values.min() + values.max()), float(np.ptp(values))
-    if not 0.0 < width < 0.02 * abs(middle):
+    if not 0.0 < width < CENTRED * abs(middle):
         return 0.0
     digits = math.ceil(math.log10(abs(middle) / width))
     return float(f"{middle:.{digits}e}")

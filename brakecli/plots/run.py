@@ -32,6 +32,10 @@ FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
 BLOCK = 1 << 20  # samples read at a time
 FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
+FLATTENS = 4.0  # times the velocity of the shoe: a wheel that is faster is not drawn beside it
+HARMONICS, ROOM = 6.5, 1.3  # times its line, and times a wave or the last frequency that shows, a spectrum reaches
+FAINTEST = 1e-10  # of the largest density: what is below shows rounding
+SPARSE = 40  # samples, of which each has a dot
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
 _BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
 
@@ -72,7 +76,9 @@ class RunPicture:
         self.envelope = start + self.interval * wholes["x"][0], *wholes[self.whole][1:]
         fastest, moving = style.largest(self.detail["belt"]), style.largest(self.detail[self.ordinate])
         speed = fastest if self.ordinate == "vx" else 0.0
-        self.near = self.ordinate == "vx" and (moving == 0.0 or fastest <= 4.0 * moving)  # U does not flatten it
+        self.near = self.ordinate == "vx" and (
+            moving == 0.0 or fastest <= FLATTENS * moving
+        )  # U does not flatten it
         ends = {name: np.array(found[1:]) for name, found in wholes.items()}
         self.axes = {
             name: scaled(name, self.detail[name], ends[name], speed * (name == "vx" and self.near))
@@ -269,13 +275,13 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
         return
     kind, line = picture.line
     few = picture.passing if len(picture.passing) <= FEW_LINES else ()
-    highest = min(frequency[-1], max([6.5 * (line or np.inf), *(1.3 * f for f in few)]))
+    highest = min(frequency[-1], max([HARMONICS * (line or np.inf), *(ROOM * f for f in few)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
     frequency, density = frequency[near], factor * density[near]
-    lowest = max(0.3 * float(density.min()), 1e-10 * float(density.max()))
+    lowest = max(0.3 * float(density.min()), FAINTEST * float(density.max()))
     axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
-    right = min(highest, max(1.3 * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))
+    right = min(highest, max(ROOM * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))
     axes.set_xlim(0.0, right)
     style.set_ticks(axes.xaxis, 0.0, right, "Hz", "frequency")
     for number, wave in enumerate(few):
@@ -300,4 +306,4 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
 
 
 def _marker(values: style.Array) -> str:
-    return "." if len(values) < 40 else ""  # a line alone would not show so few samples
+    return "." if len(values) < SPARSE else ""  # a line alone would not show so few samples

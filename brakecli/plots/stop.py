@@ -11,6 +11,7 @@ from brakecli.plots import style
 from brakecli.solver.system import System
 
 DECIBELS = 60.0  # below its largest value what a spectrogram shows
+LOUD = 0.7 * DECIBELS  # below the largest value; up to the last frequency that is louder it reaches
 MOST_LINES = 12  # waves of the wheel that are drawn in it
 _OUTLINED: dict[str, Any] = {"path_effects": [withStroke(linewidth=2.2, foreground="black")], "lw": 1.1}
 
@@ -56,7 +57,7 @@ def draw_spectrogram(axes: Axes, stop: Stop, modes: list[float]) -> None:
 
 def _highest(stop: Stop, modes: list[float]) -> float:
     """Up to where there is something to see: what is not too faint, and half as high again as both modes."""
-    loud = (stop.density > stop.density.max(initial=0.0) * 10.0 ** (-0.07 * DECIBELS)).any(axis=0)
+    loud = (stop.density > stop.density.max(initial=0.0) * 10.0 ** (-0.1 * LOUD)).any(axis=0)
     seen = float(stop.lines[loud][-1]) if loud.any() else 0.0
     return min(max(1.2 * seen, 1.5 * max(modes, default=0.0), float(stop.lines[1])), float(stop.lines[-1]))
 

@@ -13,7 +13,7 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import style
 from brakecli.plots.lock_in import FEW
 from brakecli.plots.quantities import VARIABLES, scaled
-from brakecli.plots.run import RunPicture
+from brakecli.plots.run import FAINTEST, HARMONICS, RunPicture
 
 _WIDTH, _COLUMNS = 9.4, 100  # inches; of an envelope
 _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the thin dashed one, also in grey
@@ -88,11 +88,11 @@ def _wider(picture: RunPicture) -> list[style.Array]:
 
 def _spectra(axes: Axes, pictures: list[RunPicture], variable: str, scale: float, label: str) -> None:
     """Limits and labels of the spectra, by the lines that both runs have."""
-    lines = [6.5 * line for picture in pictures if (line := picture.line[1])]
+    lines = [HARMONICS * line for picture in pictures if (line := picture.line[1])]
     highest = min(max(picture.spectrum[1][-1] for picture in pictures), max(lines, default=np.inf))
     most = scale * max(style.largest(picture.spectrum[2]) for picture in pictures)
     if most:
-        axes.set_ylim(1e-10 * most, 10.0 * most)
+        axes.set_ylim(FAINTEST * most, 10.0 * most)
     _along(axes, "frequency", [0.0, float(highest)], "Hz")
     axes.set(title=f"Spectra of {VARIABLES[variable][2]}", ylabel=label)
 

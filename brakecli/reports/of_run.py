@@ -33,6 +33,7 @@ from brakecli.sweeps.result import unit
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
 MARGIN = 0.2  # of the friction, that advice aims at
+BEYOND, MOST_BEYOND = 1.5, 4.0  # up to which that reaches: critical or own friction, and own friction at most
 VALUES = 121  # of the friction in the lock-in diagram
 MOST_SENSITIVE, MOST_CHANGES = 6, 5  # keys that are shown; the latter on the first page
 MOST_SECONDS = 60.0  # what it may take to ask all
@@ -198,9 +199,9 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
 def _diagram(advice: AdviceReport) -> Figure:
     """Modes over the friction coefficient, to half more than what matters."""
     report, c = advice.stability, advice.system.coefficients
-    highest = 1.5 * max(report.friction, advice.critical_friction or 0.0) or 1.0
-    if highest > 4.0 * report.friction > 0.0:
-        highest = 4.0 * report.friction
+    highest = BEYOND * max(report.friction, advice.critical_friction or 0.0) or 1.0
+    if highest > MOST_BEYOND * report.friction > 0.0:
+        highest = MOST_BEYOND * report.friction
     phi = np.linspace(0.0, highest, VALUES)
 
     def at(friction: float) -> tuple[Mode, ...]:

@@ -54,7 +54,7 @@ def _cache_directory() -> Path | None:
 
 _lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
 CACHE = _cache_directory()
-_PAUSE = 0.02  # s between two looks whether it has
+_PAUSE = 0.02  # s between two looks whether another process has compiled a kernel
 PATIENCE = 60.0  # s that another process may take to compile a kernel
 _held: list[int] = []  # the bytes locked for the kernels that this process compiles, each called by the one before
 

@@ -34,7 +34,7 @@ SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 _OPENS = 0.999  # part of the stiffness of the whole pad, below which it opens
 _FINEST = 1e-9  # bracket of a change over the requested one, where evaluations are cheap
-_HIDDEN = 4.0  # errors, see `hidden`
+_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `hidden`
 
 Signs = list[Rounded] | None
 """What is positive where sliding is stable; None where there is no steady sliding."""

@@ -31,7 +31,7 @@ TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
 TASKS_A_SECOND = 100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
 LONGEST_TASK = 1.0  # s of work, in the middle of long sweeps: a task costs a cluster some 5 ms of a core,
 PART_OF_REST = 0.01  # and no more than this part of what a worker has still to do: all end at about the same time
-LARGEST_TASK = 1000  # points, for up to a hundred workers; in proportion for more
+LARGEST_TASK, FEW_WORKERS = 1000, 100  # points, for so many workers; in proportion for more
 
 
 class TaskQueue:
@@ -47,7 +47,7 @@ class TaskQueue:
         self._left = sum(task.size for task in self._tasks)
         self._size, self._least, self._task_seconds = size, least, max(TASK_SECONDS, workers / TASKS_A_SECOND)
         self._part_of_rest = PART_OF_REST / workers
-        self._most = max(LARGEST_TASK, LARGEST_TASK * workers // 100)
+        self._most = max(LARGEST_TASK, LARGEST_TASK * workers // FEW_WORKERS)
         self.seconds, self.units = 0.0, 0  # computed so far
 
     def next_task(self) -> Task | None:

@@ -33,6 +33,7 @@ START_SECONDS = 2.0  # of the command and its workers, until they load kernels; 
 MOST_LOADING = 1.5  # s, which both take to load kernels: what takes longer has compiled them, and stays
 LONGEST = 0.3  # guessed time (s) of a point beyond which its run is only begun
 FEWEST, MOST = 3, 32  # places
+_ROUNDS = 60  # after which an iteration that at least halves its error has come to rounding
 DRAWN = 0.25  # of the points, at most
 LOADING = 2  # neighbours that load the kernels of lanes
 APART = 4  # neighbours that are computed where few share a loop
@@ -215,7 +216,7 @@ def drawn(shape: Sequence[int]) -> Iterator[tuple[int, ...]]:
     one it is the golden ratio.
     """
     g = 2.0
-    for _ in range(60):
+    for _ in range(_ROUNDS):
         g = (1.0 + g) ** (1.0 / (len(shape) + 1))
     for n in itertools.count():
         parts = ((0.5 + n * g ** -(axis + 1)) % 1.0 for axis in range(len(shape)))

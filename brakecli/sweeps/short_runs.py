@@ -7,6 +7,7 @@ import numpy as np
 
 from brakecli.analysis.regime.answers import FADED, QUARTER
 from brakecli.analysis.stability.advice import rounded
+from brakecli.analysis.stability.certain import EPSILON
 from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.case.system import system_of
@@ -19,7 +20,6 @@ MOST = 1000
 """Undecided points that are looked at, some milliseconds each."""
 WORTH = 0.9
 """A run for some points is named where it is shorter than that for all, by this factor or less."""
-ROUNDING = float(np.finfo(float).eps)
 
 
 def on_short_runs(journal: Journal) -> Iterator[str]:
@@ -91,7 +91,7 @@ def _growing(theory: Linear, before: Linear) -> float:
     Where it has not moved, rounding is what grows.
     """
     shift = before.rest - theory.rest
-    least = ROUNDING * np.abs(theory.rest)
+    least = EPSILON * np.abs(theory.rest)
     shift = np.where(np.abs(shift) < least, least, shift)
     return theory.seconds_to_limit(0.0, np.append(theory.rest + shift, [0.0, 0.0]))
 

@@ -12,6 +12,7 @@ from brakecli.analysis.spectrum import Array
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
 _RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKE_DEVIATIONS = 8.0  # by which a spike leaves the median of its neighbours
+_OUTER = 0.1  # part of the values at each end that the range leaves out, as spikes are there
 _SPIKE_RANGE = 0.35  # part of the signal's range by which it does so, too
 _NOISE_SHARE = 0.6  # most of the variance that noise may be where slips are sought
 _SLOWEST = 60  # parts of the record over which is smoothed at most
@@ -185,7 +186,7 @@ def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:
     """Replace single samples far from both sides. A velocity's pulses of slip are not spikes."""
     away = values - median_filter(values, 5, mode="nearest")
-    low, high = np.quantile(values, [0.1, 0.9])
+    low, high = np.quantile(values, [_OUTER, 1.0 - _OUTER])
     deviation = DEVIATION * float(np.median(np.abs(away)))
     spikes = np.abs(away) > max(_SPIKE_DEVIATIONS * deviation, _SPIKE_RANGE * float(high - low))
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)

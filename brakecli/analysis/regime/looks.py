@@ -4,10 +4,12 @@ from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.conditions import comes_to_it, regular, steady
 from brakecli.analysis.regime.decision import Excitation, Regime, Row, Thresholds
 
+_UNSETTLED = 1.5  # times the fewest cycles, where not all of them are settled; a choice
+
 LOOKS: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "few cycles",
-        lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else 1.5) * t.fewest_cycles,
+        lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else _UNSETTLED) * t.fewest_cycles,
         "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
         "run longer",
         longer=True,

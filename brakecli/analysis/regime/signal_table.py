@@ -10,6 +10,7 @@ from brakecli.analysis.regime.decision import Decision, Regime, Row, first
 from brakecli.faces import argument
 
 FEWEST_SAMPLES = 64
+_TELLS = 3.0  # times the noise of a line, beyond which energy is told from it; a choice
 
 
 @dataclass(frozen=True)
@@ -130,7 +131,7 @@ ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
     ),
     Row(
         "slips or lines",
-        lambda a, t: _skewed(a, t) and a.noise_share > _lacks(a, t) / 3.0 > 0.0,
+        lambda a, t: _skewed(a, t) and a.noise_share > _lacks(a, t) / _TELLS > 0.0,
         "stick, or lines in phase, have skewed the velocity, and noise hides which of them",
         "measure with less noise, or for longer",
     ),

@@ -16,7 +16,7 @@ from brakecli.solver.schemes import SteppingModule
 from brakecli.solver.system import System
 
 RESOLVED = 20  # steps per period, and per passing wave, below which a warning names the number
-DIFFERENCE = 1e-3  # of the static compression: what the matrix of a step is the quotient of
+DIFFERENCE = 1e-3  # of the static compression: disturbance by which the matrix of a step is found
 
 
 @dataclass(frozen=True)

@@ -34,9 +34,7 @@ from brakecli.solver.system import System
 _BEYOND = 64.0  # times as long as the run
 _DENSE, _MOST_DENSE = 128, 1024  # blocks of time for each wave at most, and times in each of them
 _SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
-_PER_PERIOD = (
-    8.0  # times of a block in a period of the fastest wave; a choice, which 33 times near the best refine
-)
+_PER_PERIOD = 8.0  # times of a block in a period of the fastest wave; the best are then refined
 _NEAR: Array = np.linspace(-1.0, 1.0, 33) / _PER_PERIOD
 _HIGHEST = 32  # blocks that are looked at so closely
 _FEW = 32  # blocks of one product, which is so small that it wakes no threads

@@ -42,7 +42,7 @@ then, over that height."""
 _NEAR = 0.5  # rad, below which the sine of a difference is not taken from sines
 _MOST_STEPS, _ROUNDED = 100, 2e-16  # of a search for a root, and the last of them over where it is
 _FOLLOWING = 6  # steps of Halley's iteration, after which the root is searched for
-_WIDER = 4.0  # half widths of a part of a cell that is known, which the next part is wide
+_WIDER = 4.0  # half widths: the next part of a cell is twice as wide as the last one
 _FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it is exact
 
 
