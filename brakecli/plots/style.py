@@ -14,7 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedFormatter, LogLocator, NullLocator
+from matplotlib.ticker import FixedFormatter, LogFormatter, LogLocator, NullLocator
 from numpy.typing import NDArray
 
 from brakecli.errors import UnreadableResultError
@@ -40,7 +40,7 @@ _LOOK: tuple[tuple[str, dict[str, Any]], ...] = (
     ("axes", {"titlesize": 10.5, "titlelocation": "left", "titlepad": 8.0}),
     ("axes", {"edgecolor": "#555555", "labelcolor": "#222222", "grid": True, "axisbelow": True}),
     ("axes.spines", {"top": False, "right": False}),
-    ("axes.formatter", {"useoffset": False, "use_mathtext": True}),
+    ("axes.formatter", {"useoffset": False, "use_mathtext": False}),  # a formula takes 5 ms, a text nothing
     ("grid", {"color": "#E4E4E4", "linewidth": 0.7}),
     ("xtick", {"color": "#444444"}),
     ("ytick", {"color": "#444444"}),
@@ -68,8 +68,12 @@ def applied(narrow: bool = False, titled: bool = True) -> Iterator[None]:
 
 def rendered(figure: Figure, suffix: str, dpi: int = 150) -> bytes:
     """The figure as a file of this suffix; its bytes do not depend on the time or the machine."""
+    every = [axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)]
+    for axis in every:
+        if isinstance(axis.get_major_formatter(), LogFormatter):  # it writes formulas
+            axis.set_major_formatter(lambda value, _: power_of_ten(value))
     figure.draw_without_rendering()
-    for axis in (axis for axes in figure.axes for axis in (axes.xaxis, axes.yaxis)):
+    for axis in every:
         if axis.get_offset_text().get_text():  # a power of ten, where another text may stand
             axis.set_major_formatter(lambda value, _: readable(value))
             figure.draw_without_rendering()
@@ -172,8 +176,18 @@ def readable(value: float, digits: int = 6) -> str:
         return f"{value:.{digits}g}".replace("-", "−")
     mantissa, _, exponent = f"{value:.{digits - 1}e}".partition("e")
     factor = mantissa.rstrip("0").rstrip(".").replace("-", "−")
-    power = "10" + str(int(exponent)).translate(_RAISED)
+    power = _raised(int(exponent))
     return {"1": power, "−1": f"−{power}"}.get(factor, f"{factor}·{power}")
+
+
+def power_of_ten(value: float) -> str:
+    """A power of ten as such, whatever its size, and any other number as it is easy to read."""
+    mantissa, _, exponent = f"{value:.6e}".partition("e")
+    return _raised(int(exponent)) if float(mantissa) == 1.0 else readable(value)
+
+
+def _raised(exponent: int) -> str:
+    return "10" + str(exponent).translate(_RAISED)
 
 
 def digits_of(largest: float, apart: float) -> int:
