@@ -105,7 +105,7 @@ def _spectra(history: History, hop: int, count: int) -> tuple[Array, Array]:
 
 
 def _statistics(history: History, hop: int, count: int) -> list[Array]:
-    """Of the middle of each window: amplitude of x and of vx without their trends, stick, and mean friction force.
+    """Amplitude of x and of vx without their trends, stick, and mean friction force, in the middle of each window.
 
     These parts lie side by side; the first and the last reach to the ends of the history.
     """

@@ -25,11 +25,11 @@ SAME_PLACE = 1e-7
 BRACKETED = 1e-7
 """Length of a bracket of the crossing that is narrow enough."""
 CARRIED = 1e-4
-"""The same where a point is carried to another chart by the problem, before it is corrected."""
+"""Distance at which two points are one, where the problem has carried one of them to another chart."""
 LEAST_SLOPE = 1e-3
 """Slope dp/ds at the first point from which on p says where a branch in another chart passes it."""
 SAME_WAY = 0.999
-"""Cosine of the angle between their tangents."""
+"""Least cosine of the angle between the tangents of two points that are one."""
 
 
 def turned_back(points: list[Point], new: Point, border: float) -> bool:

@@ -79,7 +79,7 @@ class Forced(Doubled):
 
     @classmethod
     def along(cls, line: Line, periods: int = 1, per_period: float = STEPS_PER_PERIOD) -> "Forced":
-        """Those along a line of cases, with so many steps to the fastest period.
+        """The problem of forced motions along a line of cases, with so many steps to the fastest period.
 
         Raises CaseError where no place is valid, where speed or load change, and where the waves have no common
         period.

@@ -43,7 +43,7 @@ class Shoe(NamedTuple):
 
     @classmethod
     def of(cls, system: System) -> "Shoe":
-        """Those of a system."""
+        """Take the numbers of a system."""
         return cls(system.coefficients, system.contact_stiffness, system.belt_speed, system.load_at_start)
 
     @property
@@ -83,7 +83,7 @@ class Line:
 
     @property
     def case_coefficients(self) -> Coefficients:
-        """Those of the case itself."""
+        """The coefficients of the case itself."""
         return system_of(self.case).coefficients
 
     @property

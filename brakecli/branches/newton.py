@@ -51,7 +51,7 @@ class Settings:
     Multipliers and facts are those of the place before it.
     """
     exact: float = 1e-9
-    """The same where a special point is located."""
+    """Correction that is the last one where a special point is located."""
     clear: float = 1e-3
     """Correction, times the ratio of corrections to gaps, that is the last one: about the error of the tangent."""
     iterations: int = 6

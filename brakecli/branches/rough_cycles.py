@@ -58,7 +58,7 @@ class Span:
         return default_steps(self._flow.system, span, self._per_period)
 
     def over(self, state: Array, span: float, steps: int, tangents: bool) -> int:
-        """The same in so many steps."""
+        """Carry a state over a span in so many steps."""
         self._begin, self._time = np.array(state), span
         run = self._run = self._flow(self._begin, 0.0, span, steps, tangents)
         self.state, self.word, self.times = run.state, run.word, run.times

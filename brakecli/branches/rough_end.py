@@ -34,7 +34,8 @@ a vibration vanishes a motion keeps nearly all of its distance for long, but it 
 SETTLING = 1.0
 """Powers of e by which the dashpots shrink a disturbance of a vibration before its distances are compared."""
 NOTICED = 0.2
-"""The same of the slowest disturbance of a calm motion: one that fades a twentieth as fast is seen to fade."""
+"""Powers of e by which the slowest disturbance of a calm motion fades before then. One that fades a twentieth as
+fast is seen to fade."""
 
 
 class _Span:

@@ -39,7 +39,7 @@ class Slide:
     vectors: Complex | None
     rest: tuple[float, float] | None
     tests: tuple[float, float]
-    """Of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding.
+    """Tests of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding.
 
     Where a shoe on smooth pads locks, the first one is negative.
     """

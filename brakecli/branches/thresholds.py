@@ -17,7 +17,7 @@ UP_TO = 2.0
 below it: the range reaches as far above the critical friction as there is room below. Branches are known to get
 through to there (`make bench-branch`)."""
 BEYOND = 1.05
-"""The same, in the friction of the case, where that lies higher and sliding is stable there again."""
+"""Upper end of the range, in friction of the case, where that lies higher and sliding is stable there again."""
 REACHES = 1e-6
 """Distance from an edge, over the range, at which a window ends at that edge."""
 POINTS = 500

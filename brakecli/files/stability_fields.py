@@ -30,7 +30,7 @@ THRESHOLDS = (
     Field("barrier", "m", "half of peak to peak of x of the unstable cycle at φ; null without one"),
     Field("sentence", "", "both thresholds in words; null where stability is not lost", TEXT),
 )
-"""Of limit cycles along friction, beside linear stability."""
+"""Fields of limit cycles along friction, beside linear stability."""
 VARIED = (
     *named(STABILITY, "critical_friction", "instability"),
     ratio(

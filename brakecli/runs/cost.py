@@ -108,7 +108,7 @@ def table_seconds(system: System) -> float:
 
 
 def _average_seconds(system: System) -> float:
-    """Of the mean contact at one height."""
+    """Guessed time (s) of the mean contact at one height."""
     if not fills_window(system):
         return (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system, summed=True)
     return PLACES * evaluation_seconds(system) + _window_seconds(system, averaged_length(system))

@@ -54,7 +54,7 @@ class _Axis:
 
 @dataclass
 class _Nodes(_Axis):
-    """Of quadrature nodes: where the edges of patches hardly move, no sum over many positions evens errors out."""
+    """The axis of quadrature nodes. Where edges of patches hardly move, no sum over positions evens errors out."""
 
     margin: ClassVar[float] = 2.0
 

@@ -156,5 +156,5 @@ def exact_is_cheaper(on_nodes: System, system: System) -> bool:
 
 
 def _on_nodes(system: System) -> System:
-    """The same on nodes, where the method leaves that open."""
+    """The system with its contact on nodes, where the method leaves that open."""
     return system.by(evaluator="midpoint") if system.method.automatic and not system.smooth else system

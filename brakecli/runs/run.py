@@ -53,7 +53,7 @@ class RunReport:
 
     @property
     def title(self) -> str:
-        """That of the case."""
+        """Title of the case."""
         return self.loaded.case.title
 
     @property

@@ -20,7 +20,7 @@ from brakecli.solver.system import System
 MOST_SECONDS = 20.0
 """Guessed time of the longest run that is tried: a minute of waiting at most, with those before it."""
 MOST_SAMPLES = 2_000_000
-"""And its samples: a worker of a sweep holds them in memory, with half a GB."""
+"""Samples of the longest run that is tried: a worker of a sweep holds them in memory, with half a GB."""
 
 
 class Ends(Protocol):

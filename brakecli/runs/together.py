@@ -28,7 +28,7 @@ FIRST_PER_WAVE = 8.0
 SAFETY = 3.0
 """What is promised, over the error that a run in a lane knows; docs/accuracy.md compares that with true ones."""
 ORDER = 3
-"""With which errors by steps fall, at least."""
+"""Least order with which errors by steps fall."""
 _MOST = 16.0  # times as fine, beyond which a run of its own is cheaper
 
 

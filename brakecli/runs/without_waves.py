@@ -21,7 +21,7 @@ from brakecli.solver.system import Initial, System
 LONGEST = 16.0
 """Times as long as the run, after which a motion is given up."""
 SAMPLES = 256
-"""Of a period, by which its level is found."""
+"""Samples of a period, by which its level is found."""
 
 
 def without_waves(system: System, state: Floats) -> Continued:

@@ -9,7 +9,7 @@ from brakecli.analysis.probability import LEVEL
 from brakecli.solver.compile import Floats
 
 SHARES: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75, 0.95)
-"""Of samples below the quantiles that are told."""
+"""Shares of the samples below the quantiles that are reported."""
 _RESAMPLED = 200  # times, for what chance makes of indices
 
 

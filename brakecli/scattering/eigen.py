@@ -20,7 +20,7 @@ from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.workers.task import Compute, Engine
 
 ASKED = np.dtype([("growth_rate", "f8"), ("frequency", "f8"), ("critical_friction", "f8"), ("reason", "S160")])
-"""Of a sample: growth (1/s) and frequency (Hz) of the mode that counts, and φ; NaN where it failed."""
+"""Answers of a sample: growth (1/s) and frequency (Hz) of the mode that counts, and φ; NaN where it failed."""
 
 
 def asking(plan: Plan, band: tuple[float, ...] | None) -> Compute:

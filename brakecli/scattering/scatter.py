@@ -63,7 +63,7 @@ class ScatterReport:
 
     @property
     def quantiles(self) -> dict[str, list[float]]:
-        """Those of each number, by its name."""
+        """Quantiles of each number, by its name."""
         return {each.name: each.quantiles for each in self.distributions}
 
     @property

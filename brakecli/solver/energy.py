@@ -71,4 +71,4 @@ def account(start: tuple[float, float, float], end: tuple[float, float, float], 
 
 
 NOT_KEPT = EnergyAccount(*[math.nan] * 10)
-"""Of a run that has no account."""
+"""Account of a run that keeps none: all entries are NaN."""

@@ -32,7 +32,7 @@ from brakecli.solver.tangent import FEWEST_SAMPLES, LEAST, MOST, Exponent, expon
 LEFT = 1e-3
 """What the iteration may leave of the force of a step, over load and tolerance; Newton's leaves far less."""
 MOST_SAMPLES = 1 << 14
-"""Of a run in a lane, so that the histories of all lanes take little memory."""
+"""Most samples of a run in a lane, so that the histories of all lanes take little memory."""
 
 _CONTRACTION = 0.1  # of the iteration, at most
 _MOST_BYTES, _MOST_STEPS = 1e8, 1e9  # of the tables at the nodes, and between two samples

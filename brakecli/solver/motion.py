@@ -58,7 +58,7 @@ Counted = Callable[[str, int, int], None]
 """Called with what is counted, how many are done, and of how many; 0 where that is not known."""
 
 _NO_TRACK = new(TRACK)
-"""Of motions that are not tracked: nothing is written into it."""
+"""Track of motions that are not tracked: nothing is written into it."""
 _plant_at, _evaluate_at = from_memory(PLANT), at_address(EVALUATE)
 
 

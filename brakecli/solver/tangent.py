@@ -28,7 +28,7 @@ PLACED, PLACED_LAGGING = 1 / 16, 1 / 4
 that of the level reached, the second for those whose velocity lags. Limit cycles, whose exponent is 0, have shown
 0.06 and 0.34."""
 FEWEST_SAMPLES = 64
-"""Of a run with an exponent, at which its growth is noted."""
+"""Fewest samples of a run with an exponent: its growth is noted at them."""
 LEAST, MOST = 1e-280, 1e280
 """Size of a disturbance."""
 MOST_POWERS = 700.0

@@ -124,7 +124,7 @@ UNTRACKED = Track(
     -math.inf,
     Events(_NONE, np.zeros(0, np.int8), _NONE, np.zeros((0, 3))),
 )
-"""Of a motion of which nothing has been noted."""
+"""Track of a motion of which nothing has been noted."""
 
 
 def follow(t: Any, v_x: float) -> None:

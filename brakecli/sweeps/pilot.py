@@ -111,7 +111,7 @@ class Pilot:
         return 0.0
 
     def _block(self, at: int, most: int) -> float:
-        """Of some neighbours of a point that are computed side by side with it.
+        """Processor time (s) of a point among neighbours that are computed side by side with it.
 
         As many as a task holds share loops of lanes, which take as long where lanes are empty.
         """
@@ -158,7 +158,7 @@ class Pilot:
         return [each for each in points if isinstance(each, Begun)]
 
     def _line(self, unit: int, at: int) -> float:
-        """Of a point that is followed along a line, from some place of it on."""
+        """Processor time (s) of a point that is followed along a line, from some place of it on."""
         plan, size = self.plan, self.plan.unit_length
         inner = math.prod(plan.shape[(plan.followed or 0) + 1 :])
         outer, rest = divmod(unit % (plan.points // size), inner)

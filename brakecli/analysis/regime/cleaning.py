@@ -53,7 +53,7 @@ class Velocity:
         return (c[2 * m :: stride] - 2.0 * c[m:-m:stride] + c[: -2 * m : stride]) / m**2
 
     def thinned(self, m: int) -> Array:
-        """Those samples of the velocity smoothed over m samples that differ enough to be worth a look."""
+        """Samples of the velocity smoothed over m samples, as many as differ enough to be worth a look."""
         return self.smoothed(m, max(1, m // 8))
 
     def noise_at(self, m: int) -> float:

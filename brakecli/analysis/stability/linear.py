@@ -309,7 +309,7 @@ def _modes(systems: Sequence[System], moves: Array, grip: Array) -> _Modes:
 
 
 def _with_slopes(own: _Modes, push: Array, passing: Array, slopes: Complex, bends: Complex) -> _Modes:
-    """The same with the growth that the passing waves leave to the mode by their slopes, to second order.
+    """The modes with the growth that the passing waves leave to the mode by their slopes, to second order.
 
     A small motion x(t) beside the forced one changes the normal force by S(t) x, S = Re Σ s e^{iΩt}. A mode λ
     excites x at λ ± iΩ, by G(λ ± iΩ) s/2, which acts back on it. With the forced motion X in the phases of

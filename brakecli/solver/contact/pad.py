@@ -21,9 +21,10 @@ TILE, BESIDE = 72, 3
 MOST_SUMMED = 10
 """Waves of the wheel up to which their sums at all nodes are as fast as a window."""
 ROWS: tuple[int, ...] = 1, 2, 4, 8, 16
+"""Points of the grid of a window to a node."""
 POINTS, INTERPOLATED = 12, 1e-15
-"""Of windows: points of the grid to a node; points that a height is interpolated from; the largest error of that
-over the sum of amplitudes, which is rounding."""
+"""Points from which a height in a window is interpolated, and its largest error over the sum of amplitudes,
+which is rounding."""
 
 FEWEST_CELLS, CELLS_PER_WAVE, MOST_CELLS = 8.0, 4.0, 2**16
 """Cells of the pad of which the exact contact keeps what it has found: at least, for each of the shortest waves,

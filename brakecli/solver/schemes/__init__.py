@@ -29,7 +29,7 @@ class SchemeModule(Protocol):
     MEMORY: tuple[str, ...]
     """The fields of the state that decide the next ones."""
     VELOCITIES: tuple[str, ...]
-    """Those of them that are velocities."""
+    """The fields of `MEMORY` that are velocities."""
 
     def __hash__(self) -> int:
         """Modules are told apart, as by caches."""

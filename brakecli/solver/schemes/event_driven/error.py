@@ -27,7 +27,7 @@ POINTS = np.array([len(places) for places, _ in _RULES])
 which patches come or go."""
 PLACES, SHARES = (np.array([np.resize(0.5 * each[i] + 0.5 * (1 - i), 12) for each in _RULES]) for i in (0, 1))
 _TERMS = 4
-"""Of the series, over 0.22 of a step at most, in which the fastest motion turns by less than half a radian."""
+"""Terms of the series over up to 0.22 of a step, in which the fastest motion turns by less than half a radian."""
 _AT = STAGES - 1
 _FIRST, _ROUNDING = 16, 1e-12
 """Part of a run in which no error is too large, and what of the largest place is rounding."""

@@ -32,7 +32,7 @@ _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
 """Gauss' rule over a step: as a step is a part of a period, exact to rounding for what is quadratic in z."""
 _POWERS = np.vander(np.append(_NODES, 1.0), TERMS, increasing=True)
-"""Of the nodes, and of the end of the step."""
+"""Powers of the places of the nodes, and of the end of the step."""
 
 
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, *[float64] * 4))

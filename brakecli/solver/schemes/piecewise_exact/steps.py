@@ -116,7 +116,7 @@ def _moved(m: Any, seconds: float, x: float, y: float, v_x: float, v_y: float) -
 
 @kernel(void(FLOW_TYPE, TANGENT_TYPE, float64), inlined=False)
 def carry_part(m: Any, t: Any, seconds: float) -> None:
-    """The same along a part of a step, at whose end the motion is."""
+    """Carry the error, and a disturbance, along a part of a step, at whose end the motion is."""
     e = m.error
     e[X], e[Y], e[V_X], e[V_Y] = _moved(m, seconds, e[X], e[Y], e[V_X], e[V_Y])
     _round(m)
