@@ -16,7 +16,7 @@ SEGMENTS_AT_ONCE = 16
 SEGMENTS_WANTED = 8
 SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
-_FEWEST_BINS = 3
+FEWEST_BINS = 3  # below a line, which otherwise is not told from the mean
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
 
 
@@ -70,11 +70,11 @@ def peak(
     That takes three bins below it, also below the strongest line (Hz) that the whole record shows, and five
     cycles in the duration (s) of the record.
     """
-    if density.size < _FEWEST_BINS or not density[1:].max() > 0.0 or strongest < _FEWEST_BINS * frequency[1]:
+    if density.size < FEWEST_BINS or not density[1:].max() > 0.0 or strongest < FEWEST_BINS * frequency[1]:
         return None
     i = 1 + int(np.argmax(density[1:]))
     found = interpolated(frequency, density, i)
-    return found if i >= _FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
+    return found if i >= FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
 
 
 def interpolated(frequency: Array, density: Array, i: int) -> float:

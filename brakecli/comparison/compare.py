@@ -10,6 +10,7 @@ from statistics import median
 
 import numpy as np
 
+from brakecli.analysis.spectrum import FEWEST_BINS
 from brakecli.analysis.stability import report as linear
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
@@ -30,7 +31,6 @@ LONGER = 3.0  # times a part of the motion, which the budget must allow for a lo
 AIM, MOST_LONGER = 0.7, 4.0  # part of the budget that it is to take, and times the part before, at most
 ERRORS_SHARE = 0.8  # part of the budget after which no further error is measured: the rest is for times
 SPREAD, BESIDE = 1.3, 0.005  # time of a turn over the last one, and s for each run beside its loop
-FEWEST_BINS = 3  # below a line, which otherwise is not told from the mean
 ROUNDING = 1e-9  # of the largest velocity: a line below that is rounding
 MOTION, FORCES = ("x", "y", "vx", "vy"), ("friction_force", "normal_force")  # what is compared
 MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less

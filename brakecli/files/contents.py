@@ -14,6 +14,7 @@ from brakecli.files.fields import COMPARISON, OBJECT, RUN, SWEEP, TEXT, WELCH
 from brakecli.files.read import StoredResult, Variable
 from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER
 from brakecli.files.toml_lines import parse
+from brakecli.files.valid import BLOCK
 from brakecli.files.write import FILL
 
 _CASES = ("resolved_toml", "resolved_sweep_toml", "resolved_study_toml")
@@ -29,7 +30,6 @@ _APART = {
     "format_version",
     "complete",
 }
-_BLOCK = 1 << 20  # rows read at a time
 _RISING = ("time", "frequency")  # axes along which values are interpolated
 _NAMED = 3  # keys of the case in a sentence
 _ROUNDING = 1e-9  # of the largest value, which interpolation may add
@@ -243,8 +243,8 @@ def _other_places(a: StoredResult, b: StoredResult, group: str, held: list[Varia
 def _pairs(a: StoredResult, b: StoredResult, group: str, name: str, _: str = "") -> Iterator[tuple[Any, Any]]:
     """The rows of a variable in both results, up to the end of the shorter one."""
     rows = min(result.variables(group)[name].shape[0] for result in (a, b))
-    for start in range(0, rows, _BLOCK):
-        one, other = (result.read(group, name, start, min(start + _BLOCK, rows)) for result in (a, b))
+    for start in range(0, rows, BLOCK):
+        one, other = (result.read(group, name, start, min(start + BLOCK, rows)) for result in (a, b))
         yield one, other
 
 
@@ -260,8 +260,8 @@ def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis:
     parts = [range(row(result, first), row(result, math.nextafter(last, math.inf))) for result in (a, b)]
     swapped = len(parts[1]) < len(parts[0])
     one, other, part = (b, a, parts[1]) if swapped else (a, b, parts[0])
-    for start in part[::_BLOCK]:
-        stop = min(start + _BLOCK, part.stop)
+    for start in part[::BLOCK]:
+        stop = min(start + BLOCK, part.stop)
         at, values = (one.read(group, each, start, stop) for each in (axis, name))
         near = max(row(other, at[0]) - 1, 0), row(other, at[-1]) + 1
         places, there = (other.read(group, each, *near) for each in (axis, name))

@@ -19,7 +19,7 @@ from brakecli.files import fields, stability_fields
 from brakecli.files.field import Field
 
 LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
-_BLOCK = 1 << 20  # rows read at a time
+BLOCK = 1 << 20  # rows read at a time
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")  # which neither XML nor TOML may hold
 _RATIO = 1100  # no filter of HDF5 makes data smaller than this
 DEEPEST, _MOST_NODES = 8, 10_000  # levels of groups and their variables, and the number of both
@@ -305,6 +305,6 @@ def _blocks(node: h5py.Dataset) -> Iterator[Any]:
     """The rows of a dataset in pieces, each beginning with the last row of the one before."""
     row = int(np.prod(node.shape[1:], dtype=object))
     check_memory(row * node.dtype.itemsize * packed(node), f"a row of {node.name}")
-    rows = max(1, _BLOCK // max(1, row))
+    rows = max(1, BLOCK // max(1, row))
     for start in range(0, node.shape[0], rows):
         yield np.asarray(node[max(start - 1, 0) : start + rows])

@@ -17,6 +17,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError
 from brakecli.faces import argument
 from brakecli.files.read import StoredResult
+from brakecli.files.valid import BLOCK
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
 from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
@@ -30,7 +31,6 @@ CYCLES = 12  # drawn in detail
 MOST_DETAIL = 100_000  # samples drawn one by one
 FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
-BLOCK = 1 << 20  # samples read at a time
 FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
 FLATTENS = 4.0  # times the velocity of the shoe: a wheel that is faster is not drawn beside it
 HARMONICS, ROOM = 6.5, 1.3  # times its line, and times a wave or the last frequency that shows, a spectrum reaches

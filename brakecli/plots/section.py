@@ -10,9 +10,10 @@ from brakecli.case.system import system_of
 from brakecli.errors import UsageError
 from brakecli.faces import argument
 from brakecli.files.read import StoredResult
+from brakecli.files.valid import BLOCK
 from brakecli.plots import style
 from brakecli.plots.quantities import scaled
-from brakecli.plots.run import BLOCK, case_of
+from brakecli.plots.run import case_of
 from brakecli.solver.period import common_period
 
 MOST = 200_000  # samples whose time is drawn, the last ones

@@ -23,7 +23,7 @@ _EVALUATIONS = 1.5  # of the contact in a step
 _OWN_STEPS, _AT = 25.0, 1e-10  # in a period, of a scheme that finds them itself, at this tolerance
 _ORDER = 8  # of these steps
 _STEPS_PER_WAVE, _DECAY = 8.0, 4.0  # such steps for a passing wave, and decay rate times such a step
-_FINER, _FINEST, _COARSEST = 1e-5, 1e-13, 1e-8  # tolerance of steps over that of histories, and its bounds
+_FINER, FINEST, _COARSEST = 1e-5, 1e-13, 1e-8  # tolerance of steps over that of histories, and its bounds
 _RUNS = 1.6  # where histories keep a tolerance
 _PRESSED, _PLAYS = 0.01, 0.12  # part of the time in which a pad is open in part: under load, and elsewhere
 _OWN_STEP_SECONDS = 4e-6
@@ -57,7 +57,7 @@ def guessed(system: System) -> Price:
     c, alone = system.coefficients, method.step is not None
     if method.row.exact:
         return Price(system.steps, system.steps * _EXACT_STEP_SECONDS)
-    tolerance = method.tolerance if alone else max(min(_FINER * method.tolerance, _COARSEST), _FINEST)
+    tolerance = method.tolerance if alone else max(min(_FINER * method.tolerance, _COARSEST), FINEST)
     fastest, start = system.natural_frequencies[1], system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
     rate = max(fastest * _OWN_STEPS * (_AT / tolerance) ** (1.0 / _ORDER), 0.5 * math.sqrt(bound / c.m))

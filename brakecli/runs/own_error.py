@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, displacement, sizes
-from brakecli.runs.cost import evaluation_seconds
+from brakecli.runs.cost import FINEST, evaluation_seconds
 from brakecli.runs.ladder import MOST_SECONDS, first_nodes
 from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import NODES
@@ -30,7 +30,7 @@ AIM = 0.4
 _FAR = 2.0
 """Error of steps over the promised one, beyond which a run ends early: a finer one has to follow anyway."""
 _MOST_RUNS = 8
-_FINEST, _LEAST, _MOST = 1e-13, 1e-3, 8.0  # tolerance; factors by which tolerance and nodes change at once
+_LEAST, _MOST = 1e-3, 8.0  # factors by which tolerance and nodes change at once
 _BEYOND = 1e-3  # times the finest: a tolerance that no run has, as errors may fall faster than it
 _SURER = 0.03  # of its error, that the next run is to have where an event may have been missed
 _EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are shorter and of higher order
@@ -128,9 +128,9 @@ def promised(
 def _finer(system: System, rung: System, steps: float, by_nodes: float) -> System | None:
     """A finer event-driven run."""
     at = rung.method
-    if at.tolerance < _BEYOND * _FINEST * steps:
+    if at.tolerance < _BEYOND * FINEST * steps:
         return None
-    tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), _FINEST)
+    tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), FINEST)
     found = _run(system, tolerance, NODES * -int(-rung.nodes * min(by_nodes**0.5, _MOST) // NODES))
     return found if found.method != at else None
 

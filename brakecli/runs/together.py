@@ -9,7 +9,7 @@ import numpy as np
 
 from brakecli.errors import BrakecliError
 from brakecli.runs.certificate import Certified, displacement
-from brakecli.runs.ladder import first_nodes
+from brakecli.runs.ladder import FIRST_PER_WAVE, first_nodes
 from brakecli.runs.own_error import exact_is_cheaper, promised
 from brakecli.runs.tolerance import begins_with_steps
 from brakecli.solver.alike import at_once
@@ -23,8 +23,6 @@ TOGETHER = 64
 """Cases that are certified side by side."""
 FIRST_TURN, AT = 0.12, 1e-3
 """By which angle (rad) the fastest motion turns in a first step, for this tolerance."""
-FIRST_PER_WAVE = 8.0
-"""First steps to a passing wave, at least."""
 SAFETY = 3.0
 """What is promised, over the error that a run in a lane knows; docs/accuracy.md compares that with true ones."""
 ORDER = 3
