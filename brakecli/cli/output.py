@@ -38,5 +38,5 @@ def warn(*warnings: str) -> None:
 
 def announce_compilation(trouble: str) -> None:
     """Say that kernels are being compiled, and what keeps the cache from being used."""
-    say("compiling numerical kernels, once for this version; this may take a minute or two")
+    say("compiling numerical kernels for this kind of work, once for this version; this may take a minute or two")
     warn(*filter(None, [trouble]))

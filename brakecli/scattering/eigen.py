@@ -43,7 +43,7 @@ def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
         queue.note_time(task, seconds)
         place = slice(task.first, task.first + task.size)
         found[place], finished[place] = np.frombuffer(records, ASKED), True
-        tell("samples", int(finished.sum()), count)
+        tell("shoes", int(finished.sum()), count)
     if not finished.all():
         raise BrakecliError("samples are missing; run the same command again")
     return found

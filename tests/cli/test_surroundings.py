@@ -14,7 +14,10 @@ from tests.commands import TINY, Done, brakecli, each, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
-COMPILING = "brakecli: compiling numerical kernels, once for this version; this may take a minute or two\n"
+COMPILING = (
+    "brakecli: compiling numerical kernels for this kind of work, once for this version; "
+    "this may take a minute or two\n"
+)
 
 
 def test_the_surroundings_change_no_bit(good: Path, here: Path) -> None:
