@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
@@ -91,6 +92,18 @@ def run_command(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
         return int(caught.value.code or 0)
 
     return run
+
+
+def test_numbers_at_ticks_are_texts_and_no_formulas() -> None:
+    """A formula takes 5 ms to be read, and each of them is read anew in every picture."""
+    with style.applied():
+        figure = Figure()
+        axes = figure.subplots()
+        axes.semilogy([-0.1, 0.2], [1e-3, 1e1])
+        style.rendered(figure, ".png")
+    texts = [text.get_text() for axis in (axes.xaxis, axes.yaxis) for text in axis.get_majorticklabels()]
+    assert {"10⁻²", "−0.05"} <= {*texts}
+    assert not any("$" in text for text in texts)
 
 
 def test_each_suffix_gives_a_whole_picture_of_its_kind_and_the_same_bytes_again(tmp_path: Path) -> None:
