@@ -19,7 +19,7 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from functools import cache
+from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory, TemporaryFile
@@ -31,7 +31,8 @@ ROOT = Path(__file__).parents[1]
 COMMAND = [sys.executable, "-W", "error", "-m", "brakecli"]
 LIMIT = 100.0  # s; kernels may have to be compiled first
 LONG = ["--set", "solver.duration=1e4"]  # minutes
-QUICK = 2.0  # s, within which an interruption ends a command
+QUICK = 2.0  # s of a processor, after which an interruption has ended a command
+BUSY = 10.0  # times longer that may take by the clock, where other processes want the processors
 
 TINY = """\
 title = "Tiny"
@@ -150,6 +151,24 @@ def ended(process: subprocess.Popen[bytes], limit: float = LIMIT) -> Done:
     """A command that ends by itself."""
     out, err = process.communicate(timeout=limit)
     return Done(process.returncode, out.decode(), err.decode())
+
+
+def signalled(process: subprocess.Popen[bytes], number: signal.Signals, *, group: bool = False) -> Done:
+    """A command that a signal ends soon: by the time that it computes, as a machine may be busy."""
+    assert process.poll() is None
+    before = processor_time(process.pid)
+    os.killpg(process.pid, number) if group else process.send_signal(number)
+    over = partial(os.waitid, os.P_PID, process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
+    wait_until(over, BUSY * QUICK)
+    spent = processor_time(process.pid) - before
+    assert spent < QUICK, f"it computed for {spent} s"
+    return ended(process)
+
+
+def processor_time(process: int) -> float:
+    """Seconds that a process has computed, which may have ended unless it has been waited for."""
+    numbers = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
+    return sum(map(int, numbers[11:13])) / os.sysconf("SC_CLK_TCK")
 
 
 def run(

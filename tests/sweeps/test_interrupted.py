@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import QUICK, ROOT, brakecli, ended, left_in, started, wait_until
+from tests.commands import ROOT, brakecli, ended, left_in, signalled, started, wait_until
 from tests.sweeps.helpers import PROGRAM, alive, journal_size, workers
 
 
@@ -34,11 +34,7 @@ def test_a_signal_ends_a_sweep_soon_and_in_one_sentence(
         wait_until(lambda: workers(process.pid))
         time.sleep(delay)
         crew = workers(process.pid)
-        start = time.monotonic()
-        assert process.poll() is None
-        os.killpg(process.pid, number) if group else process.send_signal(number)
-        done = ended(process)
-        assert time.monotonic() - start < QUICK
+        done = signalled(process, number, group=group)
     assert done.told(128 + number, f"brakecli: {word}").count("\n") == 1
     assert not any(map(alive, crew))
     assert left_in(here) <= {"tiny.toml", "s.toml", "s.h5.partial"}
@@ -51,10 +47,7 @@ def test_a_signal_is_heard_while_a_worker_that_starts_slowly_is_waited_for(here:
         (worker,) = workers(process.pid)
         os.kill(worker, signal.SIGSTOP)
         time.sleep(1.0)
-        start = time.monotonic()
-        process.send_signal(signal.SIGTERM)
-        done = ended(process)
-        assert time.monotonic() - start < QUICK
+        done = signalled(process, signal.SIGTERM)
     assert done.told(143) == "brakecli: terminated; nothing unfinished was left behind\n"
     assert not alive(worker)
     assert left_in(here) == {"tiny.toml", "s.toml"}  # no point is finished

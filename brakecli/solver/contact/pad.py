@@ -5,6 +5,7 @@ One buffer because every array that an evaluator receives costs time on each of 
 """
 
 import math
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -39,7 +40,7 @@ NODES = 64
 """Fewest nodes, of which all numbers of nodes are multiples; a choice."""
 
 PIECE = 100_000
-"""Pairs of waves that tables are made of at a time: signals are heard in between."""
+"""Pairs of waves, or nodes, that tables are made of at a time: signals are heard in between."""
 
 
 def default_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
@@ -99,7 +100,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     if nodes:
         pad.rows = window_rows(wheel, 2.0 * half_length / nodes)
         pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
-        table["opposite_at"][:] = _opposite(table["nodes_at"], -(-tiles // 2))
+        _opposite(table["nodes_at"], table["opposite_at"])
     return Pad(pad, flat)
 
 
@@ -179,6 +180,12 @@ def _shoe_bounds(a: float, *profile: bytes) -> tuple[float, float]:
     return min(float(f.max()) + between, crest), min(float(-f.min()) + between, crest)
 
 
+def _pieces(rows: int, wide: int = 1) -> Iterator[slice]:
+    """Rows of `wide` columns, by pieces between which a signal is heard."""
+    step = 1 + PIECE // (1 + wide)
+    return (slice(i, min(i + step, rows)) for i in range(0, rows, step))
+
+
 def _node_tables(a: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Floats) -> float:
     """Cell means of f1, and of g sin(omega xi), g cos(omega xi) for the wheel, with cells beyond each end: by
     tiles, waves, sine and cosine, and nodes. A bound of the error of f2' from the neighbouring nodes.
@@ -186,27 +193,32 @@ def _node_tables(a: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Flo
     The mean of a sine over a cell is its value in the middle times sinc(omega spacing/2). With means instead of
     values the midpoint sum of a fully touching pad is its integral, so `auto` may change over without a jump.
     """
-    tiles, spacing = len(waves), 2.0 * a / f1.size
-    xi = -a + spacing * (np.arange(TILE * tiles) + 0.5 - BESIDE)
+    spacing = 2.0 * a / f1.size
 
     def mean(f: Surface) -> Floats:
         return f.g * np.sinc(f.omega * spacing / (2.0 * np.pi))
 
-    for g, omega, phase in zip(mean(shoe), shoe.omega, shoe.phase, strict=True):  # signals are heard between waves
-        f1 += g * np.sin(omega * xi[BESIDE : BESIDE + f1.size] + phase)
-    for i, (g, omega) in enumerate(zip(mean(wheel), wheel.omega, strict=True)):
-        waves[:, i, 0], waves[:, i, 1] = (g * f(omega * xi).reshape(tiles, TILE) for f in (np.sin, np.cos))
+    for part in _pieces(f1.size):
+        xi = -a + spacing * (np.arange(part.start, part.stop) + 0.5)
+        for g, omega, phase in zip(mean(shoe), shoe.omega, shoe.phase, strict=True):
+            f1[part] += g * np.sin(omega * xi + phase)
+    for part in _pieces(len(waves), TILE):
+        xi = -a + spacing * (np.arange(TILE * part.start, TILE * part.stop) + 0.5 - BESIDE)
+        for i, (g, omega) in enumerate(zip(mean(wheel), wheel.omega, strict=True)):
+            waves[part, i] = np.stack([g * f(omega * xi).reshape(-1, TILE) for f in (np.sin, np.cos)], 1)
     turns = np.sin(np.outer([1.0, 2.0, 3.0], wheel.omega * spacing))
     differences = np.array([45.0, -9.0, 1.0]) @ turns / (30.0 * spacing)  # what they make of omega
     return float(np.abs(wheel.g) @ np.abs(wheel.omega - differences))
 
 
-def _opposite(f1: Floats, tiles: int) -> Floats:
+def _opposite(f1: Floats, into: Floats) -> None:
     """f1 by tiles as in `_node_tables` at the nodes of one half, and at those opposite; elsewhere no gap opens."""
-    half, found = f1.size // 2, np.full((2, tiles * TILE), 1e300)
-    found[0, BESIDE : BESIDE + f1.size - half] = f1[: f1.size - half]
-    found[1, BESIDE : BESIDE + half] = f1[: f1.size - half - 1 : -1]
-    return found.reshape(2, tiles, TILE).swapaxes(0, 1)
+    half = f1.size // 2
+    for part in _pieces(len(into), TILE):
+        node = np.arange(TILE * part.start, TILE * part.stop) - BESIDE
+        for side, (place, count) in enumerate(((node, f1.size - half), (f1.size - 1 - node, half))):
+            inside = (node >= 0) & (node < count)
+            into[part, side] = np.where(inside, f1[np.where(inside, place, 0)], 1e300).reshape(-1, TILE)
 
 
 def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:
@@ -218,9 +230,7 @@ def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Float
 
     def pair(f: Surface, h: Surface, sines: Floats, cosines: Floats) -> None:
         """∫ sin sin and ∫ cos cos."""
-        rows = 1 + PIECE // (1 + h.g.size)
-        for i in range(0, f.g.size, rows):
-            part = slice(i, i + rows)
+        for part in _pieces(f.g.size, h.g.size):
             minus = np.sinc(np.subtract.outer(f.omega[part], h.omega) * a / np.pi)
             plus = np.sinc(np.add.outer(f.omega[part], h.omega) * a / np.pi)
             g = a * np.outer(f.g[part], h.g)
