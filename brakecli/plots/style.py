@@ -78,7 +78,7 @@ def rendered(figure: Figure, suffix: str, dpi: int = 150) -> bytes:
             axis.set_major_formatter(lambda value, _: readable(value))
             figure.draw_without_rendering()
         thin_ticks(axis, figure)
-    figure.set_layout_engine("none")
+    figure.set_layout_engine(None)
     for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
         axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
     if mark := readings.mark():

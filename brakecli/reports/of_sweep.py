@@ -48,7 +48,6 @@ from brakecli.reports.blocks import (
 )
 from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
-from brakecli.scattering.study import Study
 from brakecli.sweeps.record import Status
 
 MOST_FAILURES = 20
@@ -192,6 +191,8 @@ def part_of_other(result: StoredResult) -> Part:
 
 def _study(result: StoredResult) -> tuple[str, list[Table]]:
     """Which brakes a study is about and what it calls squeal; what scatters, and how it was asked."""
+    from brakecli.scattering.study import Study  # with scipy.stats, for which other pages need not wait
+
     name = "resolved_study_toml" if "resolved_study_toml" in result.attributes else "study_toml"
     try:
         study = parse_table(Study, result.text(name), "its study")
