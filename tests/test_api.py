@@ -22,6 +22,7 @@ import brakecli
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from brakecli.front import progress
 from brakecli.front.progress import telling
+from tests.campaign import campaign
 from tests.commands import QUICK, ROOT, TINY
 from tests.commands import brakecli as command
 
@@ -300,6 +301,7 @@ def test_errors_name_arguments_and_no_options(
     assert "--" not in str(caught.value)
 
 
+@campaign
 def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path: Path) -> None:
     two: dict[Any, Any] = {"friction.coefficient": [0.1, 0.2]}
     results: dict[str, Any] = {
@@ -395,6 +397,7 @@ high = 0.6
 """
 
 
+@campaign
 def test_results_in_memory_are_drawn_compared_and_reported_like_their_files(tmp_path: Path) -> None:
     folder = tmp_path / "files"
     folder.mkdir()
@@ -421,6 +424,7 @@ def test_results_in_memory_are_drawn_compared_and_reported_like_their_files(tmp_
     assert (tmp_path / "page.html").read_text() == page
 
 
+@campaign
 def test_a_measured_signal_is_drawn_and_its_bursts_are_records(tmp_path: Path) -> None:
     when = np.arange(10_000) / 1e4
     tone = np.where((when > 0.25) & (when < 0.75), np.sin(2 * math.pi * 2000.0 * when), 0.0)

@@ -100,6 +100,7 @@ DISPLACED = 1e-3
 
 
 @pytest.mark.parametrize("number", counts(1, 12, 60))
+@campaign
 def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(number: int) -> None:
     """A displacement e along the eigenvector grows to λ e after a period, but for terms of the order of e².
 

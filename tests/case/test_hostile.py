@@ -1,6 +1,7 @@
 """Files that are not cases, or cannot be read, are refused quickly and in plain words."""
 
 import io
+import math
 import sys
 import time
 from pathlib import Path
@@ -44,12 +45,13 @@ HOSTILE = {
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
 def test_a_hostile_file_is_refused_within_half_a_second(text: str) -> None:
-    times = []
+    took = math.inf
     for _ in range(3):  # a busy machine takes longer now and then
-        start = time.process_time()
-        assert problems(text)
-        times.append(time.process_time() - start)
-    assert min(times) < 0.5
+        if took >= 0.5:
+            start = time.process_time()
+            assert problems(text)
+            took = time.process_time() - start
+    assert took < 0.5
 
 
 def test_a_key_of_more_than_32_parts_is_refused_and_one_of_32_is_only_unknown() -> None:

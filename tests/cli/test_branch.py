@@ -17,6 +17,7 @@ from brakecli.plots.branch import _line, _with_ends
 from brakecli.plots.result import draw
 from brakecli.plots.style import DARK, applied
 from tests.analysis.shoes import Shoe
+from tests.campaign import campaign
 from tests.commands import ROOT, environment
 from tests.commands import brakecli as command
 
@@ -273,6 +274,7 @@ main()
 """
 
 
+@campaign
 def test_an_interruption_ends_the_search_for_a_first_motion(tmp_path: Path) -> None:
     """As the waves of a rough wheel grow to find it, which takes half a minute here."""
     case = str(ROOT / "cases" / "rough-partly-open.toml")

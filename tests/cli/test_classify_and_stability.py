@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
+from tests.campaign import campaign
 from tests.commands import ROOT, brakecli, each
 
 RELAXATION = ROOT / "cases" / "relaxation.toml"
@@ -154,6 +155,7 @@ def test_many_files_give_a_verdict_each_and_one_that_cannot_be_read_does_not_sto
     assert [found.get("regime") for found in results] == [None, "quasi-harmonic", "quasi-harmonic"]
 
 
+@campaign
 def test_a_measured_signal_is_drawn_as_it_is_classified(here: Path) -> None:
     _squeal(here / "a.wav", 0.2, 0.6)
     options = ["--quantity", "force", "--time-column", "t", "--column", "force"]

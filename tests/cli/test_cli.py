@@ -20,6 +20,7 @@ import pytest
 from brakecli.about import __released__, __version__
 from brakecli.case.read import starters
 from brakecli.solver.quantities import HISTORY
+from tests.campaign import campaign
 from tests.commands import (
     COMMAND,
     LIMIT,
@@ -335,6 +336,7 @@ def test_vibration_on_smooth_pads_waits_for_no_kernels_of_rough_ones(tmp_path: P
     assert loaded.isdisjoint(unused)
 
 
+@campaign
 def test_a_sweep_without_a_search_waits_for_no_kernels_of_branches(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     axis = '[[axis]]\nparameter = "load.force"\nvalues = [1000.0, 2000.0]\n'

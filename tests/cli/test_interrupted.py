@@ -111,7 +111,7 @@ def many_waves(count: int) -> str:
     ("count", "number"),
     [
         (300, signal.SIGINT),
-        (3000, signal.SIGTERM),
+        pytest.param(3000, signal.SIGTERM, marks=campaign),
         pytest.param(300, signal.SIGTERM, marks=campaign),
         pytest.param(3000, signal.SIGINT, marks=campaign),
     ],

@@ -78,6 +78,7 @@ def write(path: Path, changed: Columns | None = None, **attributes: Any) -> Path
 
 
 @pytest.mark.parametrize("suffix", ["png", *(pytest.param(each, marks=campaign) for each in ("pdf", "svg"))])
+@campaign
 def test_each_suffix_gives_a_whole_picture_and_the_same_bytes_again(suffix: str, tmp_path: Path) -> None:
     result = write(tmp_path / "r.h5")
     for name in ("a", "b"):

@@ -32,6 +32,7 @@ from tests.plots.helpers import ANGLE, CRITICAL, SCHEME, SPEED, columns, drawn, 
 from tests.sweeps.helpers import frictions, inline, write_sweep
 
 
+@campaign
 def test_each_suffix_gives_a_whole_picture_and_the_same_bytes_again(tmp_path: Path) -> None:
     tables: list[tuple[dict[str, Any], str]] = [
         ({"axis": [ANGLE]}, "png"),
@@ -198,8 +199,7 @@ def test_numbers_at_ticks_stand_apart(tmp_path: Path) -> None:
     assert checked >= 5
 
 
-@pytest.mark.parametrize("width", [0.1, 1e-4, 1.0])
-@pytest.mark.parametrize("count", [5, 9])
+@pytest.mark.parametrize(("width", "count"), [(0.1, 5), (1e-4, 9), (1.0, 9)])
 def test_ticks_tell_apart_values_that_differ_little_about_a_large_one(
     width: float, count: int, tmp_path: Path
 ) -> None:

@@ -250,6 +250,7 @@ def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
     assert not any(marked for marked, _ in rows(alone.html))
 
 
+@campaign
 def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
     results: list[Path], tmp_path: Path, plain: None
 ) -> None:
@@ -268,7 +269,7 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
     assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
 
 
-@pytest.mark.parametrize("given", [False, True])
+@pytest.mark.parametrize("given", [False, pytest.param(True, marks=campaign)])
 def test_what_the_program_has_chosen_is_no_change_of_the_user(given: bool, tmp_path: Path, plain: None) -> None:
     """The interval of samples is a change where files give it; else it is named apart if its digits differ."""
     text = BASE if given else BASE.replace("output.sample_interval = 1e-4", "")

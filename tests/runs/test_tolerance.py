@@ -144,6 +144,7 @@ def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
     assert kept(found, case, 1e-9) <= 1e-3
 
 
+@campaign
 def test_the_edges_of_patches_that_hardly_move_do_not_break_a_certificate() -> None:
     """The wheel moves by 1 µm: the error of a sum over nodes is that of one position, and falls unevenly."""
     tables: dict[str, Any] = {

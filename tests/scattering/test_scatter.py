@@ -23,7 +23,7 @@ from brakecli.front.inputs import load_case, load_study
 from brakecli.scattering.answers import Indices, quantiles
 from brakecli.scattering.draw import drawn, for_indices
 from brakecli.scattering.study import SCRAMBLINGS, Parameter, Study
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.commands import ROOT, TINY, left_in
 from tests.commands import brakecli as command
 from tests.examples import NEVER_STABLE, SQUEAL, make
@@ -228,6 +228,7 @@ def test_a_band_tells_squeal_from_other_vibration(tmp_path: Path) -> None:
     assert shares[1] == float(report.probability.sel(outcome="unstable")) > 0.0
 
 
+@campaign
 def test_runs_and_eigenvalues_agree_on_a_shoe_that_flutters(tmp_path: Path) -> None:
     """Its vibration grows by e in 0.1 s where friction is 2 % above the critical one, and dies as fast below."""
     path = write_study(tmp_path, FRICTION, "samples = 16", "seed = 5", 'indices_of = "none"')
@@ -240,6 +241,7 @@ def test_runs_and_eigenvalues_agree_on_a_shoe_that_flutters(tmp_path: Path) -> N
     assert regimes <= {"damped", "relaxation", "quasi-harmonic", "undecided"}
 
 
+@campaign
 def test_a_study_of_runs_goes_on_where_it_was_and_gives_the_same_bytes(tmp_path: Path) -> None:
     write_study(tmp_path, FRICTION, "samples = 8", 'method = "run"', 'indices_of = "squeal"', case=TINY)
     command("scatter", "study.toml", "-j", "1", "-q", cwd=tmp_path)
@@ -282,6 +284,7 @@ def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> N
     assert (tmp_path / "s.csv").read_text().startswith("sample,")
 
 
+@campaign
 def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path: Path) -> None:
     """Of the key that scatters, its mean is moved; of another, the case has the new value."""
     path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")

@@ -152,7 +152,9 @@ def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> No
     assert address(kernel) == compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) != 0
 
 
-@pytest.mark.parametrize(("before", "found"), [("", "False"), ("import scipy.linalg.cython_blas", "True")])
+@pytest.mark.parametrize(
+    ("before", "found"), [("", "False"), pytest.param("import scipy.linalg.cython_blas", "True", marks=campaign)]
+)
 def test_kernels_load_no_blas_and_leave_it_to_those_of_others(cache: Path, before: str, found: str) -> None:
     dot = "numba.njit(lambda a: numpy.dot(a, a))(numpy.ones(3))"
     program = f"""

@@ -15,7 +15,7 @@ from brakecli.solver.motion import solve
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from tests.analysis.shoes import Shoe, random_shoes
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import ROUGH, make
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -43,7 +43,7 @@ def drawn(system: System, chance: np.random.Generator) -> tuple[Floats, float]:
     return state, chance.uniform(0.05, 2.0) / system.natural_frequencies[0]
 
 
-@pytest.mark.parametrize("number", counts(60, 1000))
+@pytest.mark.parametrize("number", counts(20, 1000))
 def test_the_derivative_is_that_of_central_differences(number: int) -> None:
     """Differences by 1e-5 of the sizes are off by its square, and by rounding: 1e-16 over 1e-5.
 
@@ -167,6 +167,7 @@ def test_least_margins_tell_how_near_a_motion_comes_to_stick_and_to_flight() -> 
     assert peak * (1.0 - 1e-12) <= high[0] <= peak + missed
 
 
+@campaign
 def test_a_motion_of_too_many_events_is_given_up() -> None:
     """Stick-slip at a hundredth of the natural period and less would not end in 60 events."""
     for _, system in shoes(50):

@@ -122,9 +122,8 @@ BETWEEN: Tables = {  # stable for half a per cent of the range
 }
 
 
-@pytest.mark.parametrize(
-    ("tables", "upper", "windows"), [pytest.param(DAMPING, 4.0, 1, marks=campaign), (BETWEEN, 5.8, 2)]
-)
+@pytest.mark.parametrize(("tables", "upper", "windows"), [(DAMPING, 4.0, 1), (BETWEEN, 5.8, 2)])
+@campaign
 def test_the_truth_lies_within_the_error_bars_of_all_windows(tables: Tables, upper: float, windows: int) -> None:
     key, critical = (
         "friction__coefficient",

@@ -113,6 +113,7 @@ def test_a_cluster_gives_the_bytes_of_a_sweep_at_home(cluster: Cluster, good: Pa
 
 
 @pytest.mark.parametrize("method", ["eigenvalue", pytest.param("run", marks=campaign)])
+@campaign
 def test_so_does_a_study_of_scatter(cluster: Cluster, tmp_path: Path, method: str) -> None:
     (tmp_path / "case.toml").write_text(TINY)
     scatters = '[[parameter]]\nkey = "friction.coefficient"\ndistribution = "uniform"\nlow = 0.1\nhigh = 0.9\n'
@@ -123,6 +124,7 @@ def test_so_does_a_study_of_scatter(cluster: Cluster, tmp_path: Path, method: st
     assert (tmp_path / "a.h5").read_bytes() == (tmp_path / "b.h5").read_bytes()
 
 
+@campaign
 def test_a_scheduler_is_found_by_its_file_and_by_the_environment(cluster: Cluster, tmp_path: Path) -> None:
     both = frictions(4, 'direction = "both"'), axis("link2.angle_deg", "values = [1.0, 5.0]")
     search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n'
@@ -137,6 +139,7 @@ def test_a_scheduler_is_found_by_its_file_and_by_the_environment(cluster: Cluste
     assert (tmp_path / "s.h5").read_bytes() == (tmp_path / "critical.h5").read_bytes()
 
 
+@campaign
 def test_in_python_a_client_leads_to_its_cluster_and_stays_open(cluster: Cluster, good: Path, here: Path) -> None:
     script = f"""
 import distributed
@@ -246,6 +249,7 @@ def test_a_scheduler_that_does_not_exist_is_reported(tmp_path: Path, options: li
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
 
+@campaign
 def test_a_scheduler_that_does_not_answer_is_not_waited_for_for_ever(tmp_path: Path) -> None:
     write_sweep(tmp_path, frictions(4))
     done = run("sweep", "s.toml", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path, command=COMMAND)
@@ -254,6 +258,7 @@ def test_a_scheduler_that_does_not_answer_is_not_waited_for_for_ever(tmp_path: P
     assert left_in(tmp_path) == {"tiny.toml", "s.toml"}
 
 
+@campaign
 def test_a_cluster_without_workers_or_with_those_of_another_version_is_reported(here: Path) -> None:
     with cluster_of(here / "dask") as cluster:
         command = ["sweep", "s.toml", "-q", "--scheduler", cluster.address]

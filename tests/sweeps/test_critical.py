@@ -386,6 +386,7 @@ def test_a_window_between_two_values_of_the_scan_has_a_narrow_bar() -> None:
 
 
 @pytest.mark.parametrize("scheme", ["two-layer", pytest.param("three-layer", marks=campaign)])
+@campaign
 def test_rounding_of_a_far_position_is_in_the_error_bar_near_self_locking(scheme: str) -> None:
     exact = stability(system_of(make(SOFT))).critical
     assert exact is not None

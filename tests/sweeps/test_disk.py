@@ -23,6 +23,7 @@ def journal_bytes(folder: Path) -> int:
     return len(json.dumps(identity(plan))) + 100 * plan.points
 
 
+@campaign
 def test_a_full_disk_ends_a_sweep_with_the_path_and_keeps_what_is_finished(good: Path, here: Path) -> None:
     whole = journal_bytes(here)
     kept = 0

@@ -28,7 +28,7 @@ from brakecli.sweeps.plan import plan_of
 from brakecli.sweeps.simulate import simulate
 from brakecli.sweeps.workers.task import compute_units
 from tests.analysis.shoes import random_shoes
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.commands import ROOT, TINY
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, quick, write_sweep
 
@@ -218,7 +218,7 @@ def test_a_point_takes_less_than_200_bytes_of_journal_and_of_result(tmp_path: Pa
     assert sizes[1] - sizes[0] < 360 * 200  # what all results have in common takes 60 kB
 
 
-@pytest.mark.parametrize("followed", ["none", "first", "last"])
+@pytest.mark.parametrize("followed", ["first", *(pytest.param(each, marks=campaign) for each in ("none", "last"))])
 def test_a_result_of_many_blocks_holds_every_point_in_its_place(tmp_path: Path, followed: str) -> None:
     """`quick` numbers points as they are computed: along the followed axis first."""
     direction = 'direction = "both"'

@@ -9,6 +9,7 @@ from brakecli.branches.line import Line
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
+from tests.campaign import campaign
 from tests.examples import make
 from tests.sweeps.independent import smooth_is_unstable
 from tests.sweeps.shoes import flat_critical
@@ -62,6 +63,7 @@ def test_growth_so_fast_that_a_run_leaves_full_contact_shows_no_gap_of_stability
     assert [smooth_is_unstable({**FAST, "friction": {"coefficient": at}}) for at in places] == [False, True]
 
 
+@campaign
 def test_growth_by_theory_is_known_where_the_wheel_has_many_waves() -> None:
     """Of thirty waves theory takes up four: near zero, where others might count, a long motion decides."""
     wheel = {"amplitudes": [7.67e-6 / 30] * 30, "wavelengths": np.linspace(0.03, 0.09, 30).round(5).tolist()}

@@ -17,7 +17,7 @@ from tests.sweeps.helpers import PROGRAM, alive, journal_size, workers
     ("number", "group", "delay"),
     [
         (signal.SIGINT, True, 0.05),
-        (signal.SIGTERM, True, 0.6),
+        pytest.param(signal.SIGTERM, True, 0.6, marks=campaign),
         (signal.SIGTERM, False, 1.0),
         pytest.param(signal.SIGINT, True, 0.3, marks=campaign),
         pytest.param(signal.SIGINT, False, 0.6, marks=campaign),
@@ -53,6 +53,7 @@ def test_a_signal_is_heard_while_a_worker_that_starts_slowly_is_waited_for(here:
     assert left_in(here) == {"tiny.toml", "s.toml"}  # no point is finished
 
 
+@campaign
 def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: Path) -> None:
     with started("sweep", "s.toml", "-q", "-j", "1", cwd=here) as process:
         wait_until(lambda: journal_size(here) > 5000)

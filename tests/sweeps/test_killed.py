@@ -99,7 +99,7 @@ def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path) ->
     [
         pytest.param(deadly, 1, "killed by SIGKILL, as when memory runs out", marks=campaign),
         (deadly, 5, "killed by SIGKILL, as when memory runs out"),
-        (hungry, 5, "it ran out of memory"),
+        pytest.param(hungry, 5, "it ran out of memory", marks=campaign),
         (broken, 5, "ZeroDivisionError: division by zero"),
     ],
 )
@@ -121,6 +121,7 @@ def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(
     assert capfd.readouterr().err == ""
 
 
+@campaign
 def test_workers_that_die_idle_cost_no_point(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(12))
     with LocalEngine(partial(slow, loaded.plan), 2) as engine:
@@ -155,6 +156,7 @@ def test_linear_algebra_takes_one_thread_in_a_worker_and_ours_here(
     assert os.environ.get("OPENBLAS_NUM_THREADS") == ours
 
 
+@campaign
 def test_a_point_without_memory_fails_with_the_reason_and_exit_code_1(tmp_path: Path) -> None:
     durations = axis("solver.duration", "values = [0.02, 100.0, 0.03]")
     write_sweep(tmp_path, durations, case=TINY.replace("sample_interval = 1e-4", "sample_interval = 1e-5"))
@@ -163,6 +165,7 @@ def test_a_point_without_memory_fails_with_the_reason_and_exit_code_1(tmp_path: 
     assert done.json["status"] == ["done", "failed", "done"]
 
 
+@campaign
 def test_workers_that_cannot_start_end_a_command_and_are_not_tried_for_each_point(tmp_path: Path) -> None:
     """A script that fails wherever it is not the main process."""
     write_sweep(tmp_path, frictions(500))

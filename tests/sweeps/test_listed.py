@@ -12,6 +12,7 @@ from brakecli.files.read import open_result
 from brakecli.sweeps.journal import identity
 from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.workers.task import compute_units
+from tests.campaign import campaign
 from tests.commands import brakecli as command
 from tests.sweeps.helpers import axis, inline, local, write_sweep
 
@@ -56,6 +57,7 @@ def test_points_of_a_table_are_those_of_the_cases_that_they_name(tmp_path: Path)
             assert result.read("/", "steps").item() == found[1][point]
 
 
+@campaign
 def test_workers_get_the_same_points(tmp_path: Path) -> None:
     loaded = listed(tmp_path)
     inline(loaded, tmp_path / "s.h5", compute_units)

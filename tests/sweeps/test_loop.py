@@ -92,6 +92,7 @@ def test_the_loop_opens_at_the_critical_value_and_closes_at_the_fold(tmp_path: P
     assert min(found.vibrates["down"]) - step <= shoe.lower <= min(found.vibrates["down"])
 
 
+@campaign
 def test_runs_that_are_too_short_are_told_with_the_duration_that_is_enough(tmp_path: Path) -> None:
     shoe = Followed(tmp_path, WIDE)
     values = np.linspace(0.7 * shoe.lower, 1.25 * shoe.critical, 25).tolist()

@@ -12,6 +12,7 @@ from brakecli.runs import limits
 from brakecli.runs.cost import Price
 from brakecli.sweeps.simulate import checked
 from brakecli.sweeps.workers.task import compute_units
+from tests.campaign import campaign
 from tests.commands import brakecli, left_in
 from tests.examples import ROUGH, make
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, local, write_sweep
@@ -33,7 +34,7 @@ SWEEPS = {
 }
 
 
-@pytest.mark.parametrize("name", SWEEPS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "grid" else campaign) for n in SWEEPS])
 def test_no_way_of_computing_a_sweep_changes_a_byte(tmp_path: Path, name: str) -> None:
     loaded = write_sweep(tmp_path, *SWEEPS[name])
     inline(loaded, tmp_path / "s.h5", compute_units)
@@ -60,6 +61,7 @@ def test_no_way_of_computing_a_sweep_changes_a_byte(tmp_path: Path, name: str) -
         same()
 
 
+@campaign
 def test_a_critical_value_by_simulation_does_not_depend_on_the_workers(tmp_path: Path) -> None:
     angles = axis("link2.angle_deg", "values = [3.0, 8.0]")
     search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\ntolerance = 0.1\n'

@@ -63,6 +63,7 @@ WORKER_MARGIN = 10_000_000
 @pytest.mark.parametrize(
     ("points", "compute"), [(10_000, "quick"), pytest.param(100_000, "compute_units", marks=campaign)]
 )
+@campaign
 def test_many_points_need_no_more_memory_than_a_thousand(tmp_path: Path, points: int, compute: str) -> None:
     few, many = memory_of(tmp_path, 1000, compute), memory_of(tmp_path, points, compute)
     assert many["parent"] < few["parent"] + POINT_BYTES * (points - 1000)

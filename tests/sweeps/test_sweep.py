@@ -19,6 +19,7 @@ from brakecli.sweeps.record import Status, blank, record_type
 from brakecli.sweeps.result import SweepReport, _hysteresis
 from brakecli.sweeps.simulate import simulate
 from brakecli.sweeps.workers.task import Task, compute_units
+from tests.campaign import campaign
 from tests.commands import TINY, attributes, brakecli, left_in
 from tests.sweeps.helpers import inline
 
@@ -127,6 +128,7 @@ def test_an_axis_of_texts_and_a_search_without_axes_have_their_dimension(tmp_pat
     assert report.findings.critical[0] == 1
 
 
+@campaign
 def test_a_search_says_what_it_does_not_find_without_dashpots(tmp_path: Path) -> None:
     text = 'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
     rough = CASE + "\n[roughness.wheel]\namplitudes = [1e-9]\nwavelengths = [0.02]\n"
@@ -323,7 +325,7 @@ def test_no_hysteresis_is_said_of_points_alone_that_are_decided(tmp_path: Path) 
 def test_the_summary_and_the_json_carry_the_names_of_the_file(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(GRID)
-    done = brakecli("sweep", "s.toml", "--json", "--set", "solver.duration=0.1", cwd=tmp_path)
+    done = brakecli("sweep", "s.toml", "--json", "-j", "1", "--set", "solver.duration=0.1", cwd=tmp_path)
     assert done.code == 0
     assert "6 points on" in done.err
     found = opened(tmp_path / "s.h5")

@@ -348,6 +348,7 @@ def followed(name: str, key: str, ends: tuple[float, float]) -> Search:
         pytest.param("both sides", "shoe__mass", (1.491, 9.317), 3.69096, 3.6, marks=campaign),
     ],
 )
+@campaign
 def test_a_stable_motion_is_followed_until_it_ends(
     name: str, key: str, ends: tuple[float, float], truth: float, least: float
 ) -> None:
