@@ -71,6 +71,7 @@ def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch:
     assert [each.name for each in tmp_path.iterdir()] == ["kept.h5"]
 
 
+@campaign
 def test_settings_lead_to_the_same_run_whether_the_case_was_loaded_before_or_not(tmp_path: Path) -> None:
     places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
     heights = 1e-6 * np.sin(2.0 * places)
@@ -561,6 +562,7 @@ def test_what_a_line_has_counted_is_told_to_its_end(
     assert capsys.readouterr().err.splitlines() == told
 
 
+@campaign
 def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
     places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
     heights = 1e-6 * np.sin(2.0 * places) + 3e-7 * np.sin(6.0 * places)
@@ -655,6 +657,7 @@ def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
             brakecli.advise(CASE, margin=margin)  # type: ignore[arg-type]
 
 
+@campaign
 def test_what_comes_from_a_damaged_file_stays_marked(tmp_path: Path) -> None:
     brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
     content = bytearray((tmp_path / "r.h5").read_bytes())

@@ -11,7 +11,7 @@ from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from tests.analysis.histories import verdict_of
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import SQUEAL, make
 
 SHOES = [  # α in degrees, c2/c1, k in N/m²
@@ -49,7 +49,7 @@ def disturbed(report: StabilityReport, frequency: float, seconds: float) -> dict
     }
 
 
-@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("mirrored", [False, pytest.param(True, marks=campaign)])
 @pytest.mark.parametrize("motion", ["below", "slow wheel", "fast wheel"])
 @pytest.mark.parametrize("kind", SHOES)
 def test_flat_shoes_ten_percent_off_their_critical_friction(

@@ -13,7 +13,7 @@ from tests.analysis.score import MOVED, Score, said, score, verdict, wrong
 from tests.analysis.shoes import STRATA, Shoe, random_shoes
 from tests.campaign import campaign
 
-FEW = {"smooth": 10, "slow": 5, "full": 2, "open": 1, "frictionless": 2}
+FEW = {"smooth": 6, "slow": 3, "full": 2, "open": 1, "frictionless": 2}
 MANY = {"smooth": 190, "slow": 100, "full": 150, "open": 100, "frictionless": 50}
 SEED = 2026
 

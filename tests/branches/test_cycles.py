@@ -50,6 +50,7 @@ def told(found: Followed, point: Point) -> bool | None:
 
 
 @pytest.mark.parametrize("number", counts(2, 20, 100))
+@campaign
 def test_multipliers_are_those_of_differences_of_another_scheme(number: int) -> None:
     """Points end with a correction of up to 1e-5 whose multipliers are not computed again.
 

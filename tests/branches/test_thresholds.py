@@ -48,9 +48,8 @@ def motion(tables: Tables, friction: float, frequency: float, start: dict[str, A
     )
 
 
-@pytest.mark.parametrize(
-    "number", [SUBCRITICAL[-1], *(pytest.param(n, marks=campaign) for n in (*SUBCRITICAL[:-1], SUPERCRITICAL))]
-)
+@pytest.mark.parametrize("number", [*SUBCRITICAL, SUPERCRITICAL])
+@campaign
 def test_they_are_those_of_the_branch_command_over_another_range(number: int) -> None:
     """To the bars of the special points, which are 1e-10 and less of the range."""
     tables = shoe(number)

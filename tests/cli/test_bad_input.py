@@ -7,6 +7,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.campaign import campaign
 from tests.commands import LONG, TINY, brakecli, each, left_in, shell, variants
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -185,6 +186,7 @@ def test_a_name_that_is_too_long_to_be_drawn_from_is_told(tmp_path: Path) -> Non
     brakecli("plot", "x" * 300, cwd=tmp_path).told(4, "cannot be read as a result: File name too long; ")
 
 
+@campaign
 def test_a_pipe_is_read_once(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     sweep = 'case = "tiny.toml"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [1.0]\n'

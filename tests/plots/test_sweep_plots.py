@@ -299,6 +299,7 @@ def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: P
 
 
 @pytest.mark.parametrize("every", [3, pytest.param(1, marks=campaign)])
+@campaign
 def test_sweeps_of_any_values_are_drawn(tmp_path: Path, every: int) -> None:
     """All missing, all zero, all the same, of very different size; one axis and two."""
     values: list[Callable[[int], Any]] = [

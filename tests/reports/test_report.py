@@ -223,6 +223,7 @@ def test_advice_that_would_take_long_is_left_to_the_command(
     assert "What to change is left out: `brakecli advise` takes about" in reported(results[0]).html
 
 
+@campaign
 def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
     tmp_path: Path, compiled: None, plain: None
 ) -> None:

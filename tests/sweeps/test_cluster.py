@@ -302,6 +302,7 @@ def test_a_scheduler_that_dies_ends_the_sweep_with_a_sentence(here: Path) -> Non
 
 
 @pytest.mark.parametrize("before", ["", pytest.param(LATE, marks=campaign)])
+@campaign
 def test_a_cluster_without_workers_is_waited_for_and_then_given_up(here: Path, before: str) -> None:
     with cluster_of(here / "dask") as cluster:
         only = cluster.worker("--no-nanny")

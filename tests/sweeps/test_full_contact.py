@@ -53,6 +53,7 @@ def test_without_dashpots_a_large_motion_beside_full_contact_hides_no_flutter() 
     assert answer.windows == ((answer.value, 0.94),)
 
 
+@campaign
 def test_growth_so_fast_that_a_run_leaves_full_contact_shows_no_gap_of_stability() -> None:
     answer = found(FAST, 1.9, 1e-3)
     assert answer.value is not None

@@ -108,6 +108,7 @@ def test_runs_that_are_too_short_are_told_with_the_duration_that_is_enough(tmp_p
     assert long.vibrates["down"] == [value for value in values if value > shoe.lower]
 
 
+@campaign
 def test_a_loop_that_short_runs_miss_altogether_is_told(tmp_path: Path) -> None:
     """All that is decided is damped both ways. That alone would be taken for an answer."""
     shoe = Followed(tmp_path, WIDE)
