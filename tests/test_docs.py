@@ -1,12 +1,14 @@
 """The documentation names what files and commands give."""
 
 import importlib
+import re
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
 
+from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, starters
@@ -16,6 +18,7 @@ from brakecli.comparison.result import ComparisonReport, write
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import values_of
 from brakecli.files.read import open_result
+from brakecli.plots.branch import _MARKERS
 from brakecli.runs.run import run
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
@@ -77,6 +80,17 @@ def test_every_threshold_stands_in_the_documentation_with_its_default() -> None:
     page = (ROOT / "docs" / "regimes.md").read_text()
     for name, value in vars(Thresholds()).items():
         assert f"| `{name}` | {value:g} |" in page
+
+
+def test_every_answer_by_which_a_motion_is_judged_stands_in_the_evidence() -> None:
+    page = (ROOT / "docs" / "regimes.md").read_text().partition("## The evidence")[2]
+    assert [name for name in Answers._fields if f"`{name}`" not in page] == [], "write them into The evidence"
+
+
+def test_every_kind_of_special_point_has_a_mark_in_pictures_and_a_row_in_the_page() -> None:
+    page = (ROOT / "docs" / "branches.md").read_text().partition("## Which special points")[2]
+    kinds = re.findall(r"^\| `([^`]+)`", page.partition("\n## ")[0], re.MULTILINE)
+    assert {*kinds} == {*_MARKERS}, "add it to _MARKERS or to the table of kinds, where it is missing"
 
 
 @campaign
