@@ -32,7 +32,7 @@ class Spectrum(NamedTuple):
 
     multipliers: Complex
     """The largest modulus comes first."""
-    tests: tuple[float, float, float]
+    tests: tuple[float, ...]
     """asinh of det(I - M), of det(I + M), and of the product of 1 - λ_i λ_j over all pairs.
 
     NaN where rounding decides their sign.

@@ -23,7 +23,7 @@ class Point:
     """Length along the branch from its first point, in the charts of the points."""
     multipliers: Complex
     stable: bool
-    tests: tuple[float, float, float, float]
+    tests: tuple[float, ...]
     """dp/ds; asinh of det(I - M), of det(I + M), and of the bialternate product."""
     coefficients: tuple[float, ...]
     """asinh of the coefficients of the characteristic polynomial."""
@@ -47,13 +47,12 @@ class Point:
 
     def turned(self) -> "Point":
         """The same point of the branch walked the other way."""
-        turn, *others = self.tests
         sign, log = self.orientation
         return replace(
             self,
             tangent=-self.tangent,
             s=-self.s,
-            tests=(-turn, others[0], others[1], others[2]),
+            tests=(-self.tests[TURN], *self.tests[FOLD:]),
             orientation=(-sign, log),
         )
 

@@ -116,7 +116,8 @@ def test_each_row_of_looks_decides_where_it_holds(row: str) -> None:
 
 def test_every_row_has_a_record_that_trips_it() -> None:
     tried = {name.partition(":")[0] for name in (*SMOOTH_ROWS, *ROUGH_ROWS)} | {*LOOK_ROWS}
-    assert {row.name for row in (*CONTACT, *SMOOTH, *ROUGH, *LOOKS)} == tried
+    rows = {row.name for row in (*CONTACT, *SMOOTH, *ROUGH, *LOOKS)}
+    assert rows == tried, "write a record of answers for each row into SMOOTH_ROWS, ROUGH_ROWS or LOOK_ROWS"
 
 
 def test_the_last_row_of_each_part_always_holds() -> None:

@@ -5,6 +5,7 @@ import pytest
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.tables import tables_within
+from brakecli.solver.contact import EVALUATORS
 from tests.case.examples import CONSTANT, EVENT_DRIVEN, VARYING, messages, problems, put, where
 
 VALUES = ("nan", "inf", "-1", "0", "1e999", "1e-320", '"text"', "true", "2020-01-01", "[1, 2]")
@@ -112,7 +113,7 @@ def test_a_problem_reads_file_line_key_what_found_and_remedy() -> None:
 
 
 REMEDIES = {
-    ("contact.evaluator", '"quick"'): 'give one of "auto", "closed-form", "midpoint", "exact"',
+    ("contact.evaluator", '"quick"'): "give one of " + ", ".join(f'"{name}"' for name in EVALUATORS),
     ("solver.tolerance", "1e-14"): "give a number from 1e-13 to 0.01",
     ("contact.nodes", "1"): "give a whole number from 2 to 10000000",
     ("link1.angle_deg", "91"): "give a number from -90 to 90, in deg",

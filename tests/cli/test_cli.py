@@ -291,7 +291,7 @@ def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
     for command, done in zip(commands, each(ROOT, [[command, "--help"] for command in commands]), strict=True):
         assert done.told(0) == ""
         assert "Usage: " in done.out
-        assert f"brakecli {command}" in documentation, command
+        assert f"brakecli {command}" in documentation, f"name `brakecli {command}` in the README or in docs/"
 
 
 # how it is shown

@@ -20,7 +20,7 @@ from brakecli.solver.records import Layer
 from brakecli.solver.roughness import Surface, surface, wheel_angles
 
 EPS = 2.0**-52
-EVALUATORS = ("closed-form", "midpoint", "exact", "auto")
+EVALUATORS = tuple(contact.EVALUATORS)
 
 
 class Wave(NamedTuple):

@@ -8,11 +8,12 @@ import pytest
 from brakecli.analysis.stability.discrete import step_limits
 from brakecli.case.system import system_of
 from brakecli.solver import motion as simulation
+from brakecli.solver import schemes
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import Failure
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
-SCHEMES = [("two-layer", (0.5, 0.5)), ("three-layer", (0.25, 0.5, 0.25))]
+SCHEMES = [(name, row.theta) for name, row in schemes.SCHEMES.items() if not row.own_steps]
 
 
 @pytest.mark.parametrize(("scheme", "theta"), SCHEMES)

@@ -28,6 +28,7 @@ _OWN = Regime.UNDECIDED, Excitation.SELF_EXCITED  # how it looks, `LOOKS` decide
 _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
+_DECAYS = _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)"
 
 CONTACT: tuple[Row[Answers, Thresholds], ...] = (
     Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
@@ -110,24 +111,32 @@ COMES_AND_GOES: Row[Answers, Thresholds] = Row(
     "run longer",
     longer=True,
 )
+_HELD: Row[Answers, Thresholds] = Row(
+    "linear, held by the steps",
+    lambda a, t: a.linear and grows(a, t) and a.steadier,
+    _LINEAR + ": it grows at {a.own:.3g} 1/s, but the scheme's steps damp it",
+    "{a.steadier}",
+)
+_GROWS: Row[Answers, Thresholds] = Row(
+    "linear, grows",
+    lambda a, t: a.linear and grows(a, t),
+    _LINEAR + ": still growing at {a.own:.3g} 1/s ({a.ringing:.4g} Hz)",
+    "run at least {a.grown:.3g} s",
+    longer=True,
+)
+_NO_DASHPOTS: Row[Answers, Thresholds] = Row(
+    "no friction, no dashpots",
+    lambda a, t: a.frictionless,
+    "without friction nothing excites the shoe, but no dashpot damps it",
+    _DASHPOT,
+)
 SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
-    Row(
-        "linear, held by the steps",
-        lambda a, t: a.linear and grows(a, t) and a.steadier,
-        _LINEAR + ": it grows at {a.own:.3g} 1/s, but the scheme's steps damp it",
-        "{a.steadier}",
-    ),
-    Row(
-        "linear, grows",
-        lambda a, t: a.linear and grows(a, t),
-        _LINEAR + ": still growing at {a.own:.3g} 1/s ({a.ringing:.4g} Hz)",
-        "run at least {a.grown:.3g} s",
-        longer=True,
-    ),
+    _HELD,
+    _GROWS,
     Row(
         "linear, decays",
         lambda a, t: a.linear and decays(a, t),
-        _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)",
+        _DECAYS,
         "",
         _DAMPED,
     ),
@@ -139,12 +148,7 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
         "",
         _DAMPED,
     ),
-    Row(
-        "no friction, no dashpots",
-        lambda a, t: a.frictionless,
-        "without friction nothing excites the shoe, but no dashpot damps it",
-        _DASHPOT,
-    ),
+    _NO_DASHPOTS,
     Row(
         "no dashpots",
         lambda a, t: a.undamped and not a.growth > 0.0,
@@ -196,15 +200,15 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "run at least {a.two_waves:.3g} s",
         longer=True,
     ),
-    *SMOOTH[:1],
+    _HELD,
     Row(
         "linear, forced",
         lambda a, t: a.linear and decays(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: " + SMOOTH[2].sentence,
+        "only the roughness shakes the shoe: " + _DECAYS,
         "",
         *_FORCED,
     ),
-    SMOOTH[1],
+    _GROWS,
     Row(
         "linear, open",
         lambda a, t: a.linear,
@@ -219,7 +223,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "",
         *_FORCED,
     ),
-    SMOOTH[5],
+    _NO_DASHPOTS,
     Row(
         "bounces",
         lambda a, t: not a.touches,
