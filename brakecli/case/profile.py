@@ -66,6 +66,7 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
     rms = float(np.sqrt(np.mean(found**2)))
     straight = "its heights lie on a straight line, which is removed; leave the surface out, which is smooth"
     require(rms > _ROUNDING * float(np.abs(height).max()), straight)
+    require(rms < radius, f"its heights have an RMS of {rms:.3g} m, beyond the wheel's radius; check their unit")
     chosen, amplitudes, phases, lost = _strongest(found, error)
     phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
     note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.3g} % of the RMS of {rms:.3g} m{how}"

@@ -99,7 +99,9 @@ def disturbances(numbers: Mapping[str, Any]) -> list[str]:
 def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     """A verdict, from the names and values that `--json` gives."""
     rows = [*_verdict_rows(numbers), ("disturbances", disturbances(numbers))]
-    si_unit = fields.MEASURED_UNITS.get(numbers.get("quantity", ""), "")
+    quantity = numbers.get("quantity", "")
+    si_unit = fields.MEASURED_UNITS.get(quantity, "")
+    noise_unit = "m/s" if quantity == "acceleration" else si_unit  # an acceleration is judged by its integral
     tones = numbers.get("bursts", ())
     for tone in tones[:MOST_LISTED_BURSTS]:
         when, level = f"{tone['start']:.4g} to {tone['end']:.4g} s", f"{tone['level']:.3g} {si_unit}"
@@ -107,7 +109,7 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     if len(tones) > MOST_LISTED_BURSTS:
         rows.append(("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json"))
     for name, value in numbers["evidence"].items():
-        unit = si_unit if name == "noise" else fields.evidence_unit(name)
+        unit = noise_unit if name == "noise" else fields.evidence_unit(name)
         rows.append((name.replace("_", " "), TERMINAL.text(value, unit)))
     return two_columns(source, rows)
 

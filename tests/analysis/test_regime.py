@@ -81,6 +81,14 @@ def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
     assert verdict.stick_fraction == 1.0
 
 
+def test_a_shoe_that_never_moves_along_a_standing_wheel_has_a_verdict_while_the_load_changes() -> None:
+    changes: dict[str, Any] = {"wheel__angular_speed": 0.0, "friction__coefficient": 2.0, "load__force": None}
+    load = {"load__times": (0.0, 0.5), "load__forces": (100.0, 5000.0)}
+    verdict = verdict_of(make(SQUEAL, **changes, **load, solver__duration=0.5))
+    assert verdict.regime is Regime.DAMPED
+    assert verdict.left == 0.0
+
+
 def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
     changes: dict[str, Any] = {"link2__stiffness": 0.0, "link2__damping": 0.0, "solver__duration": 0.5}
     verdict = verdict_of(make(SQUEAL, **changes))

@@ -61,7 +61,7 @@ def test_missing_values_and_jumps_of_time_are_gaps(tmp_path: Path) -> None:
     assert np.isnan(missing).tolist() == [False, True, True, False]
     jump = read(written(tmp_path, "0,1\n1,2\n2,3\n6,7\n7,8\n8,10\n"), time="1")
     assert np.isnan(jump.values).tolist() == [False, False, False, True, True, True, False, False, False]
-    assert "1 jumps in time" in jump.notes[0]
+    assert jump.notes == ("jumps in time, treated as gaps: 1",)
 
 
 def test_irregular_sampling_is_resampled_and_reported(tmp_path: Path) -> None:

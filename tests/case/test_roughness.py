@@ -268,6 +268,7 @@ WRONG = {
     "0,1e-108\n1,-1e-108\n2,1e-108\n3,0\n": "its heights differ by 2e-108 m; check their unit",
     "0,1\n1e299,2\n2e299,1\n3e299,0\n": "a place is 3e+299 in SI units; check the unit",
     "angle_deg,height_um\n0,0\n4e-6,1\n8e-6,0\n400,1\n": "its heights lie on a straight line",
+    "angle_deg,z\n0,1\n45,-1\n90,1\n135,-1\n180,1\n225,-1\n270,1\n315,-1\n": "an RMS of 1 m; check their unit",
     "t,x (" + "   ".join("m" * 22) + "!)\n1,2\n2,3\n3,1\n4,5\n": "there is no unit m   m",
     "\0\0": "this is not text",
 }

@@ -76,6 +76,16 @@ def test_evidence_has_the_units_of_the_page() -> None:
             assert shown[name.replace("_", " ")] == f"2.5 {'' if unit == '1' else unit}".rstrip(), name
 
 
+def test_the_noise_of_an_acceleration_is_that_of_the_velocity_by_which_it_is_judged() -> None:
+    for quantity, unit in (("displacement", "m"), ("velocity", "m/s"), ("acceleration", "m/s"), ("force", "N")):
+        numbers: dict[str, Any] = dict.fromkeys(
+            ("frequency", "amplitude", "stick_fraction", "contact_loss_fraction")
+        )
+        numbers |= {"regime": "damped", "excitation": "none", "reasons": ["so it is"], "evidence": {"noise": 2.5}}
+        last = verdict_table("f.csv", numbers | {"quantity": quantity}).splitlines()[-1]
+        assert last.split(maxsplit=1) == ["noise", f"2.5 {unit}"]
+
+
 def test_a_terminal_gets_messages_without_a_broken_word_and_a_file_gets_them_in_one_line(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

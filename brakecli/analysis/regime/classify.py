@@ -35,6 +35,7 @@ def classify(given: Sequence[Given], thresholds: Thresholds = _DEFAULT, *, in_fu
 def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *, in_full: bool) -> Verdict:
     """The verdict on one history."""
     part, radius, cycles, look = what.part, shown.context.radius, what.cycles, shown.seen
+    moves = not found.few_samples and found.moves and look.largest_level > 0.0  # velocities may all be 0
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
         found = found._replace(frequency=what.frequency or math.nan)
@@ -49,7 +50,7 @@ def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *,
         amplitude_forced=what.forced,
         amplitude_own=what.own,
         forced_frequency=what.forced_frequency,
-        left=look.final_level / look.largest_level if not found.few_samples and found.moves else 0.0,
+        left=look.final_level / look.largest_level if moves else 0.0,
         growth_rate=found.own if theory and math.isfinite(found.own) else None,
         ringing_frequency=theory.mode.frequency if theory else None,
         frequency_resolution=1.0 / (segment(part.stop - part.start) * shown.interval),

@@ -260,7 +260,7 @@ def _evenly(values: Array, times: Array) -> Signal:
     for i in jumps:
         first, last = np.searchsorted(grid, [times[i] + 0.5 * step, times[i + 1] - 0.5 * step])
         even[first:last] = np.nan
-    notes = [f"{len(jumps)} jumps in time were treated as gaps"] if len(jumps) else []
+    notes = [f"jumps in time, treated as gaps: {len(jumps)}"] if len(jumps) else []
     if float(np.abs(within - step).max()) > _UNEVEN * step:
         notes.append(f"the samples were not equally spaced and were resampled at {1.0 / step:.6g} Hz")
     return Signal(even, step, tuple(notes))

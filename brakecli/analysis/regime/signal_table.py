@@ -159,7 +159,7 @@ ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
         "reaches the belt's speed",
         lambda a, t: a.reaches,
         "the velocity just reaches that of the belt",
-        "with less noise it would show whether it stays",
+        "less noise may show whether it stays",
     ),
     Row(
         "irregular",
