@@ -10,9 +10,13 @@ campaign, statistics = pytest.mark.campaign, pytest.mark.statistics
 
 
 def counts(few: int, many: int, most: int = 0) -> list[Any]:
-    """How many cases a test draws, as its parameters: in `make test`, the campaign, and `make statistics`."""
-    large = [pytest.param(most, marks=statistics)] if most else []
-    return [few, pytest.param(many, marks=campaign), *large]
+    """How many cases a test draws, as its parameters: in `make test`, the campaign, and `make statistics`.
+
+    0 leaves one out. A test that `make test` leaves out says so here: marked as a whole, it would draw the large
+    count of `make statistics` in the campaign as well.
+    """
+    drawn = (few, ()), (many, campaign), (most, statistics)
+    return [pytest.param(count, marks=marks) for count, marks in drawn if count]
 
 
 NUMBER = re.compile(r"(?<![\w.])[-−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w.]*\.\w)")

@@ -49,8 +49,7 @@ def told(found: Followed, point: Point) -> bool | None:
     return gap < CLOSED and apart(point.multipliers, own) < TOLD and stable
 
 
-@pytest.mark.parametrize("number", counts(2, 20, 100))
-@campaign
+@pytest.mark.parametrize("number", counts(0, 20, 100))
 def test_multipliers_are_those_of_differences_of_another_scheme(number: int) -> None:
     """Points end with a correction of up to 1e-5 whose multipliers are not computed again.
 
@@ -100,13 +99,13 @@ def settled(motion: Phasewise, state: Array, period: float) -> float:
 DISPLACED = 1e-3
 
 
-@pytest.mark.parametrize("number", counts(1, 12, 60))
-@campaign
+@pytest.mark.parametrize("number", counts(0, 12, 60))
 def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(number: int) -> None:
     """A displacement e along the eigenvector grows to λ e after a period, but for terms of the order of e².
 
-    The mean of the two sides has the e² taken away. The two sides come to different motions. Cycles are left out
-    with a border nearer than the displacement, behind which the derivative is another one.
+    The mean of the two sides has the e² taken away. Neither side comes back. They come to different motions below
+    the flutter; beyond it, steady sliding grows to where the other side comes too. Cycles are left out with a
+    border nearer than the displacement, behind which the derivative is another one.
     """
     seen = wrong = 0
     for found in branches(202, number):
@@ -138,10 +137,13 @@ def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(numbe
             if len(parts) < 2:
                 continue
             one, other = (settled(motion, begin, period) for begin in begins)
+            gaps = [abs(one - amplitude), abs(other - amplitude)]
+            if point.p < found.flutter.p:
+                gaps.append(abs(one - other))
             seen += 1
             grows = abs(0.5 * sum(parts) - growth) < 0.01 * growth
-            wrong += not (grows and abs(one - other) > DISPLACED * amplitude)
-    assert seen > 0 or number < 5
+            wrong += not (grows and min(gaps) > DISPLACED * amplitude)
+    assert seen > 0
     assert wrong <= 0.02 * seen
 
 

@@ -142,8 +142,7 @@ def test_a_low_wave_forces_the_linear_response_and_its_multipliers_are_those_of_
     assert point.facts.contact_loss_fraction == 0.0
 
 
-@pytest.mark.parametrize("many", counts(1, 10))
-@campaign
+@pytest.mark.parametrize("many", counts(0, 10))
 def test_the_critical_value_of_the_search_is_an_end_of_stability(many: int) -> None:
     """To its tolerance and error bar. Windows narrower than its tolerance are not found by the search."""
     seeds = (seed for seed in range(9000, 9100) if line_of(seed)[1].keys == (FRICTION,))
