@@ -26,7 +26,7 @@ def command(
         from brakecli.sweeps.cost import estimate, refuse_sweep
         from brakecli.sweeps.driver import cores
 
-        cost = estimate(sweep.plan, cores())
+        cost = estimate(sweep.plan, min(cores(), sweep.plan.units), spare=True)
         numbers = {"valid": True, **vars(cost)}
         show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
         warn(*cost.refused)

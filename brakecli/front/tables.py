@@ -174,8 +174,8 @@ def check_table(title: str, found: Check) -> str:
 
 def estimate_table(title: str, found: Estimate) -> str:
     """What a sweep would cost."""
-    rows = [("points", str(found.points)), ("workers", str(found.workers)), *_cost_rows(found)]
-    return two_columns(title, rows)
+    workers = str(found.workers or "none, as they would take longer to start")
+    return two_columns(title, [("points", str(found.points)), ("workers", workers), *_cost_rows(found)])
 
 
 def _cost_rows(found: Check | Estimate) -> list[Row]:

@@ -28,12 +28,13 @@ from brakecli.solver.motion import Counted
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.listed import GIVEN, Listed
+from brakecli.sweeps.pilot import WORKER_SECONDS
 from brakecli.sweeps.plan import LoadedSweep, Plan, sweep_of
 from brakecli.sweeps.result import SweepReport, unit
 from brakecli.sweeps.workers.task import Compute, Engine
 
-_SMOOTH_SECONDS, _ROUGH_SECONDS, _FEW_SECONDS = 4e-4, 0.1, 2.0
-"""What the eigenvalues of a sample take, about; below which time no workers are started."""
+_SMOOTH_SECONDS, _ROUGH_SECONDS = 4e-4, 0.1
+"""What the eigenvalues of a sample take, about."""
 _CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
 
 
@@ -202,7 +203,7 @@ def engine_for(
 ) -> Engine:
     """The engine for the samples of a plan: this process where workers would take as long to start."""
     each = _SMOOTH_SECONDS if system_of(plan.case({})).smooth else _ROUGH_SECONDS
-    few = compute is not None and plan.points * each < _FEW_SECONDS
+    few = compute is not None and plan.points * each < WORKER_SECONDS
     if few and jobs is None and scheduler is None and scheduler_file is None:
         jobs, in_caller = 1, True
     return choose_engine(plan, jobs, scheduler, scheduler_file, in_caller=in_caller, compute=compute)

@@ -13,7 +13,7 @@ from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import FILE_BYTES, MOST_BYTES, check, refuse, within_range
 from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
-from brakecli.sweeps.pilot import Pilot
+from brakecli.sweeps.pilot import WORKER_SECONDS, Pilot
 from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical
 
@@ -36,7 +36,10 @@ _POINT_BYTES, _FOLLOWED_BYTES = 20.0, 400.0  # in the parent, which writes lines
 
 @dataclass(frozen=True)
 class Estimate:
-    """Points, time (s, all workers together), memory and size of the result (bytes) of a sweep."""
+    """Points, time (s, all workers together), memory and size of the result (bytes) of a sweep.
+
+    Without workers, the process that asks computes the points itself.
+    """
 
     points: int
     workers: int
@@ -50,18 +53,18 @@ class Estimate:
     def sentence(self) -> str:
         """The estimate in words."""
         noun, crew = ("point" if self.points == 1 else "points"), ("worker" if self.workers == 1 else "workers")
-        about = "at least" if self.at_least else "about"
+        about, on = ("at least" if self.at_least else "about"), f" on {self.workers} {crew}" * bool(self.workers)
         return (
-            f"{self.points} {noun} on {self.workers} {crew}: {about} {duration_text(self.seconds)}, "
+            f"{self.points} {noun}{on}: {about} {duration_text(self.seconds)}, "
             f"{self.memory / 1e6:.0f} MB of memory, a file of {self.file_size / 1e6:.2g} MB"
         )
 
 
-def estimate(plan: Plan, workers: int) -> Estimate:
+def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
     """Estimate a sweep by computing some of its points; the first and the last one are looked at.
 
-    Searches are computed with them where verdicts come early, or eigenvalues answer; others take too long, and are
-    guessed.
+    `spare`: there are no workers where they would take longer to start than the points take. Searches are computed
+    with them where verdicts come early, or eigenvalues answer; others take too long, and are guessed.
     """
     samples, tables, forced, early, failing, critical = 0, 0.0, 0.0, True, list[str](), plan.sweep.critical
     by_simulation = critical is not None and critical.method == "simulation"
@@ -80,7 +83,9 @@ def estimate(plan: Plan, workers: int) -> Estimate:
     if guessed:
         each += _SEARCH_RUNS * each + _SMOOTH_SECONDS + forced
     records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
-    held = _SAMPLE_BYTES * samples * workers * pilot.together
+    if spare and not (guessed or pilot.at_least) and plan.units * plan.unit_length * each < WORKER_SECONDS:
+        workers = pilot.workers = 0
+    held = _SAMPLE_BYTES * samples * max(workers, 1) * pilot.together
     return Estimate(
         points=records,
         workers=workers,

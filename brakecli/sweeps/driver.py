@@ -90,12 +90,14 @@ def choose_engine(
     """The engine for a sweep: workers here, or those of a dask scheduler. Raises UsageError.
 
     `scheduler` is its address, or a client or a cluster of dask. `in_caller`: a single worker is this process
-    itself. `compute` is what it computes, in place of points.
+    itself; in a script it must be asked for, or the time that a sweep takes would decide whether the script needs
+    a guard. `compute` is what it computes, in place of points.
     """
     compute = compute or partial(compute_units, plan)
     if scheduler is None and scheduler_file is None:
-        workers = min(jobs or cores(), plan.units)
-        return CallerEngine(compute) if in_caller and jobs == 1 else LocalEngine(compute, workers)
+        if in_caller and jobs == 1:
+            return CallerEngine(compute)
+        return LocalEngine(compute, min(jobs or cores(), plan.units), spare=jobs is None and not in_caller)
     from brakecli.sweeps.workers.dask import ClusterEngine
 
     return ClusterEngine(compute, scheduler, scheduler_file)
@@ -128,7 +130,8 @@ def sweep(
     that fails is marked and reported.
     """
     plan, start = loaded.plan, time.perf_counter()
-    found = estimate(plan, engine.workers)
+    found = estimate(plan, engine.workers, spare=engine.spare)
+    engine = engine if found.workers else CallerEngine(engine.compute)
     with new_result(output, force=force) as result:
         refuse_sweep(found, free_bytes(output.resolve().parent))
         with open_journal(journal_path(output), plan, force=force) as journal:

@@ -29,7 +29,8 @@ from brakecli.sweeps.simulate import judged, judged_together
 SECONDS = 1.0
 """Processor time (s) after which no further place is drawn. Other programs do not change it."""
 PART = 0.05  # of the time of the sweep, as far as it is known, that the pilot may take
-START_SECONDS = 2.0  # of the command and its workers, until they load kernels; and to end
+START_SECONDS = 0.7  # of the command, until it loads kernels, and to end
+WORKER_SECONDS = 1.3  # that its workers take to start, until they load kernels
 MOST_LOADING = 1.5  # s, which both take to load kernels: what takes longer has compiled them, and stays
 LONGEST = 0.3  # guessed time (s) of a point beyond which its run is only begun
 FEWEST, MOST = 3, 32  # places
@@ -46,7 +47,7 @@ class Pilot:
     """What the points that were drawn have cost."""
 
     plan: Plan
-    workers: int
+    workers: int  # none where this process computes the points
     with_searches: bool
     times: list[float] = field(default_factory=list)  # processor time (s) of a point, at each place
     points: list[int] = field(default_factory=list)  # that were looked at
@@ -56,6 +57,7 @@ class Pilot:
     alone: int = 0  # and how many of them were not certified there
     begun: bool = False  # runs were only begun, and may take longer
     start: float = START_SECONDS  # s, beside the points
+    loading: float = 0.0  # s, of kernels
 
     @property
     def seconds(self) -> float:
@@ -70,7 +72,8 @@ class Pilot:
 
     def sweep_seconds(self, each: float) -> float:
         """The time (s) of the sweep where a point takes `each`: no unit is shared by two workers."""
-        return self.start + math.ceil(self.plan.units / self.workers) * self.plan.unit_length * each
+        start = self.start + self.loading + (WORKER_SECONDS + self.loading) * bool(self.workers)
+        return start + math.ceil(self.plan.units / max(self.workers, 1)) * self.plan.unit_length * each
 
     def look(self) -> None:
         """Draw places and compute their points until that has taken its time."""
@@ -81,14 +84,14 @@ class Pilot:
             if not self.times:  # the kernels are loaded first
                 begin = process_time()
                 self._place(shape, place, most=LOADING)
-                self.start += 2.0 * min(process_time() - begin, MOST_LOADING)
+                self.loading += min(process_time() - begin, MOST_LOADING)
                 self.points.clear()
             begin = process_time()
             seconds = self._place(shape, place)
             if seconds > UNEVEN * max(self.times, default=math.inf):  # kernels may have been loaded there
                 looked_at, begin = len(self.points), process_time()
                 again = self._place(shape, place)
-                self.start += 2.0 * min(max(seconds - again, 0.0), MOST_LOADING)
+                self.loading += min(max(seconds - again, 0.0), MOST_LOADING)
                 seconds = min(seconds, again)
                 del self.points[looked_at:]
             self.times.append(seconds)

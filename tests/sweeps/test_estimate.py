@@ -1,6 +1,7 @@
 """What a sweep is said to cost: which of its points are computed for it, and when it says "at least"."""
 
 from collections.abc import Sequence
+from contextlib import nullcontext
 from itertools import islice
 from pathlib import Path
 
@@ -8,10 +9,13 @@ import numpy as np
 import pytest
 import tomli_w
 
+from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_sweep
 from brakecli.sweeps.cost import estimate
+from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.pilot import DRAWN, MOST, UNEVEN, Pilot, drawn
 from brakecli.sweeps.point import compute, line_points
+from brakecli.sweeps.workers.local import LocalEngine
 from tests.examples import ROUGH
 from tests.sweeps.helpers import axis, frictions, write_sweep
 
@@ -100,6 +104,24 @@ def test_units_that_no_two_workers_share_are_counted_whole(tmp_path: Path) -> No
 def test_a_search_that_is_too_long_to_be_computed_says_at_least(tmp_path: Path) -> None:
     critical = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\n'
     assert "at least" in estimate(write_sweep(tmp_path, critical).plan, 1).sentence()  # runs with a given step
+
+
+def test_a_short_sweep_is_computed_without_workers_unless_they_are_asked_for(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    short = write_sweep(tmp_path, frictions(4)).plan
+    found = estimate(short, 2, spare=True)
+    assert found.workers == 0
+    assert found.sentence().startswith("4 points: about ")
+    assert found.seconds < estimate(short, 2).seconds - 1.0  # they take that long to start
+    assert "4 points on 2 workers" in estimate(short, 2).sentence()
+    long = write_sweep(tmp_path, frictions(4).replace("num = 4", "num = 10000")).plan
+    assert estimate(long, 2, spare=True).workers == 2
+    monkeypatch.setattr(LocalEngine, "run", lambda engine, tasks: iter(()))  # which leaves all points missing
+    for jobs, in_caller, starts in ((None, False, False), (2, False, True), (None, True, True)):
+        missing = pytest.raises(BrakecliError, match="4 of 4") if starts else nullcontext()
+        with choose_engine(short, jobs, in_caller=in_caller) as engine, missing:
+            sweep(write_sweep(tmp_path, frictions(4)), tmp_path / "s.h5", engine, force=True)
 
 
 def test_a_followed_motion_that_dies_out_below_the_numbers_of_a_case_goes_on(tmp_path: Path) -> None:

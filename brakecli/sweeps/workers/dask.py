@@ -32,7 +32,7 @@ class ClusterEngine(Engine):
 
         It is given by its address, or by a client or a cluster of dask; these stay as they are.
         """
-        self._compute, self._versions, self._shared = compute, fingerprint(), None
+        self.compute, self._versions, self._shared = compute, fingerprint(), None
         address = str(getattr(getattr(scheduler, "scheduler", None), "address", scheduler))
         given, name = ("scheduler", address) if scheduler_file is None else ("scheduler-file", scheduler_file)
         self._where = f"{argument(given)} {name}"
@@ -101,7 +101,7 @@ class ClusterEngine(Engine):
 
     def _submit(self, task: Task) -> Any:
         # What computes, measured profiles included, is a task as well: it travels once, and survives its worker.
-        self._shared = self._shared or self._client.submit(_itself, self._compute, pure=False)
+        self._shared = self._shared or self._client.submit(_itself, self.compute, pure=False)
         return self._client.submit(_attempt, self._shared, task, self._versions, pure=False)
 
     def _collect(self, future: Any) -> Finished | None:

@@ -39,7 +39,7 @@ class CallerEngine(Engine):
 
     def __init__(self, compute: Compute) -> None:
         """Remember what computes."""
-        self._compute = compute
+        self.compute = compute
 
     def __exit__(self, *error: object) -> None:
         """Nothing was started."""
@@ -47,7 +47,7 @@ class CallerEngine(Engine):
     def run(self, next_task: NextTask) -> Iterator[Finished]:
         """Compute until there are no more tasks."""
         while (task := next_task()) is not None:
-            finished = attempt(self._compute, task)
+            finished = attempt(self.compute, task)
             check_signals()
             yield finished
 
@@ -60,11 +60,11 @@ class LocalEngine(Engine):
     waits for them.
     """
 
-    def __init__(self, compute: Compute, workers: int) -> None:
+    def __init__(self, compute: Compute, workers: int, *, spare: bool = False) -> None:
         """Prepare as many workers. Each is started with its first task."""
-        self.workers = workers
+        self.compute, self.workers, self.spare = compute, workers, spare
         self.pool: list[Worker] = []
-        self._compute, self._ending = compute, ExitStack()
+        self._ending = ExitStack()
         self._lost: int | None = 0  # workers that ended before any has answered; None once one has
 
     def __enter__(self) -> Self:
@@ -119,7 +119,7 @@ class LocalEngine(Engine):
             raise BrakecliError(f"{what}; {remedy}") from error
         # By the pipe, as signals are heard while a large one waits there until the worker has started.
         with suppress(OSError):
-            worker.pipe.send(self._compute)
+            worker.pipe.send(self.compute)
         return worker
 
     def _refuse_starts(self, code: int) -> None:

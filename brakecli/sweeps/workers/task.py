@@ -43,9 +43,14 @@ NextTask = Callable[[], Task | None]
 
 
 class Engine(ABC):
-    """Computes tasks by `workers` processes; a context, which ends those that it has started."""
+    """Computes tasks by `workers` processes; a context, which ends those that it has started.
+
+    `spare`: the caller may compute the tasks itself, where that takes no longer than workers take to start.
+    """
 
     workers: int
+    compute: "Compute"
+    spare = False
 
     def __enter__(self) -> Self:
         """Start nothing yet."""
