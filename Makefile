@@ -88,7 +88,7 @@ demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation
 test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
 	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
-campaign: $(DEV_STAMP) docs ## run the long statistics, of which make test has a smaller part (25 minutes)
+campaign: $(DEV_STAMP) docs ## run long tests and statistics, of most of which make test has a smaller part (25 minutes)
 	$(BIN)/python $(PYTEST) -m campaign $(PYTEST_ARGS)
 
 lowest: $(LOWEST_STAMP) ## run the tests with every dependency at the lowest version that pyproject.toml declares

@@ -455,6 +455,7 @@ def test_objects_of_a_result_are_records() -> None:
     assert shown.reasons == ()
 
 
+@campaign
 def test_vibrations_while_the_wheel_stops_are_records(tmp_path: Path) -> None:
     stop = {"wheel": {"radius": 0.5, "times": [0.0, 0.4], "angular_speeds": [0.2, 0.02]}}
     settings = {**stop, "solver": {"tolerance": 1e-3, "duration": 0.4}}
@@ -465,6 +466,7 @@ def test_vibrations_while_the_wheel_stops_are_records(tmp_path: Path) -> None:
         assert [vars(each) for each in found.brakecli.vibrations] == printed
 
 
+@campaign
 def test_a_notebook_shows_the_table_and_the_picture(tmp_path: Path) -> None:
     tree = brakecli.run(CASE, SHORT, output=tmp_path / "r.h5")
     shown = tree.brakecli
@@ -496,6 +498,7 @@ def test_tables_say_what_results_of_other_kinds_answer() -> None:
     assert f"{modes.attrs['critical_values']:.6g}" in repr(modes.brakecli)
 
 
+@campaign
 def test_a_branch_begins_at_a_run_in_memory() -> None:
     along: dict[Any, Any] = {"friction.coefficient": (0.5, 0.9)}
     ended = brakecli.run(CASE, {"solver": {"tolerance": 1e-6, "duration": 1.0}})

@@ -80,6 +80,7 @@ def test_every_file_beside_the_cases_reads() -> None:
     assert kinds[False] == 3
 
 
+@campaign
 def test_without_dashpots_flutter_begins_least_where_both_directions_are_equally_stiff() -> None:
     sp = importlib.import_module("sympy")  # which has no types
     c1, c2, k, alpha = sp.symbols("c1 c2 K alpha", positive=True)

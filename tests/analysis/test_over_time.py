@@ -15,6 +15,7 @@ from brakecli.files.read import open_result
 from brakecli.solver.history import History, array_history
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.schedules import schedule
+from tests.campaign import campaign
 from tests.commands import ROOT, brakecli
 
 SYSTEM = replace(system_of(parse_case(*read_text(str(ROOT / "cases" / "brake-stop.toml"))).case), interval=1e-4)
@@ -99,6 +100,7 @@ def test_constant_speed_or_few_samples_have_no_windows() -> None:
     assert over_time(burst(0.0, 0.4, samples=4000), SYSTEM) is not None
 
 
+@campaign
 def test_a_stop_is_analysed_in_its_file_in_json_and_by_classify(tmp_path: Path) -> None:
     case = str(ROOT / "cases" / "brake-stop.toml")
     done = brakecli("run", case, "-o", "stop.h5", "--json", cwd=tmp_path)

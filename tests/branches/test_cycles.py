@@ -147,7 +147,7 @@ def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(numbe
     assert wrong <= 0.02 * seen
 
 
-@pytest.mark.parametrize("number", counts(2, 12, 60))
+@pytest.mark.parametrize("number", counts(0, 12, 60))
 def test_runs_beside_a_stable_cycle_return_to_it(number: int) -> None:
     """After n periods |λ|ⁿ of a displacement is left, times the condition of the eigenvectors.
 
@@ -310,7 +310,7 @@ def beside_fold(found: Followed, fold: Point) -> tuple[tuple[Point, Point], tupl
     return near, far
 
 
-@pytest.mark.parametrize("number", counts(6, 40, 200))
+@pytest.mark.parametrize("number", counts(2, 40, 200))
 def test_branches_reach_the_end_of_the_range(number: int) -> None:
     lost = [
         found.branch.ended[1].reason for found in branches(707, number) if found.branch.ended[1].kind != "range"
@@ -327,9 +327,8 @@ CORNERS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("seed", "which"), [pytest.param(*each, marks=[] if each == (404, 30) else campaign) for each in CORNERS]
-)
+@pytest.mark.parametrize(("seed", "which"), CORNERS)
+@campaign
 def test_a_branch_goes_on_beyond_a_sharp_corner(seed: int, which: int) -> None:
     tables = next(islice(random_shoes("smooth", seed), which, None))
     critical = Shoe.of(tables).critical

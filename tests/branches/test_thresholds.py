@@ -74,7 +74,9 @@ def test_they_are_those_of_the_branch_command_over_another_range(number: int) ->
     assert ("after a push beyond" in str(found.sentence)) == (number != SUPERCRITICAL)
 
 
-@pytest.mark.parametrize("number", [*SUBCRITICAL, *(pytest.param(each, marks=campaign) for each in MORE)])
+@pytest.mark.parametrize(
+    "number", [*SUBCRITICAL[1:], *(pytest.param(each, marks=campaign) for each in (SUBCRITICAL[0], *MORE))]
+)
 def test_a_strong_push_dies_out_below_and_lasts_above(number: int) -> None:
     """The push is the state of the shoe as it squeals, 5 % above its critical friction."""
     tables = shoe(number)

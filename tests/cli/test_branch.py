@@ -66,6 +66,7 @@ def test_the_starter_can_vibrate_below_its_critical_friction(here: Path, found: 
     assert found["critical_windows_upper"] == [1.0]
 
 
+@campaign
 def test_runs_that_start_on_either_side_of_the_barrier_end_apart(here: Path, found: dict[str, Any]) -> None:
     """A fifth of the push that the unstable cycle stands for dies out, and five times it lasts."""
     points = found["branches"][1]["points"]
@@ -161,6 +162,7 @@ def test_the_function_gives_the_same_branches(here: Path, found: dict[str, Any])
         brakecli.branch(here / "branch.toml", parameter={"friction.coefficient": 3.0})  # type: ignore[dict-item]
 
 
+@campaign
 def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path, found: dict[str, Any]) -> None:
     settings = ("--set", "friction.coefficient=0.6", "--set", "solver.duration=2.0")
     command("run", "branch.toml", *settings, "-q", "-o", "from.h5", cwd=here).told(0)
@@ -244,6 +246,7 @@ main()
 """
 
 
+@campaign
 def test_an_interruption_leaves_a_whole_file_that_ends_in_budget(here: Path) -> None:
     """The signal comes at the thirtieth motion."""
     words = [sys.executable, "-c", INTERRUPTED, "branch", "branch.toml", *FRICTION, "-o", "cut.h5", "-q"]

@@ -384,6 +384,7 @@ def test_a_progress_bar_appears_on_a_terminal_and_leaves_it_clean(folder: Path) 
     assert told.count(f"{ESCAPE}[?25h") == told.count(f"{ESCAPE}[?25l")  # and the cursor is back
 
 
+@campaign
 def test_quiet_shows_no_bar_and_no_color_no_colours(folder: Path) -> None:
     assert on_a_terminal(["run", "tiny.toml", "-q", "-o", "q.h5"], folder) == (0, "", "")
     code, _, told = on_a_terminal(["run", "tiny.toml", "-o", "n.h5"], folder, NO_COLOR="1")

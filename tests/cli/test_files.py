@@ -96,6 +96,7 @@ def test_what_is_exported_can_be_classified_by_its_names_and_units(folder: Path,
     assert verdict.json["frequency"] == pytest.approx(attributes(folder / "b.h5")["frequency"], rel=1e-3)
 
 
+@campaign
 def test_as_many_values_as_directions_are_exported(tmp_path: Path) -> None:
     """`hysteresis` has one number for each value, alike in both directions."""
     (tmp_path / "tiny.toml").write_text(TINY)
@@ -430,6 +431,7 @@ def test_results_of_two_kinds_are_not_compared(folder: Path) -> None:
 
 
 @pytest.mark.parametrize("names", [("modes.h5", "other.h5"), ("b.h5", "short.h5")])
+@campaign
 def test_two_results_are_drawn_over_each_other(folder: Path, tmp_path: Path, names: tuple[str, str]) -> None:
     done = brakecli("diff", *(folder / name for name in names), "-o", "d.png", "--json", cwd=tmp_path)
     assert done.json["output"] == "d.png"

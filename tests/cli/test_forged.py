@@ -118,6 +118,7 @@ def test_what_other_programs_have_added_does_no_harm(results: Path, tmp_path: Pa
 @pytest.mark.parametrize(
     "text", ["a = 1\na.b = 2", *(pytest.param(t, marks=campaign) for t in (f"a = {'[' * 3000}{']' * 3000}", ""))]
 )
+@campaign
 def test_a_sweep_whose_case_is_no_toml_is_drawn_and_not_reported_on(
     results: Path, tmp_path: Path, text: str
 ) -> None:
@@ -128,6 +129,7 @@ def test_a_sweep_whose_case_is_no_toml_is_drawn_and_not_reported_on(
     tried(tmp_path, "f.h5", ["report"]).told(4, "the case in it is not valid")
 
 
+@campaign
 def test_a_dollar_sign_in_a_unit_or_a_name_begins_no_formula(results: Path, tmp_path: Path) -> None:
     for name in ("$x^{b$.h5", "$y^{$.h5"):
         shutil.copy(results / "run.h5", tmp_path / name)

@@ -14,6 +14,7 @@ from brakecli.case.system import system_of
 from brakecli.front.stability_tables import stability_table
 from brakecli.sweeps.lock_in import lock_in
 from brakecli.sweeps.tables import Axis
+from tests.campaign import campaign
 from tests.commands import ROOT, brakecli, each, left_in
 from tests.plots.helpers import panels
 
@@ -34,6 +35,7 @@ def here(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@campaign
 def test_the_same_numbers_are_in_json_in_the_file_and_in_a_spreadsheet(here: Path) -> None:
     numbers = brakecli("stability", MODE_COUPLING, *FRICTION, "--json", cwd=here).json
     assert numbers["parameters"] == ["friction.coefficient"]

@@ -20,6 +20,7 @@ COMPILING = (
 )
 
 
+@campaign
 def test_the_surroundings_change_no_bit(good: Path, here: Path) -> None:
     surroundings: list[dict[str, str | None]] = [
         {"LC_ALL": "de_DE.UTF-8", "LC_NUMERIC": "de_DE.UTF-8", "LANG": "de_DE.UTF-8", "COLUMNS": "1"},
@@ -84,6 +85,7 @@ def odd_in(text: str) -> set[str]:
     return {char for char in text if char != "\n" and unicodedata.category(char) in ("Cc", "Cf")}
 
 
+@campaign
 def test_no_control_character_of_a_file_a_name_or_a_title_reaches_the_terminal(good: Path, tmp_path: Path) -> None:
     (tmp_path / f"{ODD}.toml").write_text(TINY)
     (tmp_path / f"{ODD}.csv").write_text(f"{ODD},y\n0,1\n1,2\n")

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.campaign import campaign
 from tests.commands import TINY, Done, brakecli, left_in, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -40,6 +41,7 @@ def test_a_full_standard_output_is_told(here: Path) -> None:
         assert done.told(74, "standard output: cannot write: no space left on device").count("\n") == 1
 
 
+@campaign
 def test_closed_streams_and_a_full_standard_error_change_nothing(good: Path, here: Path) -> None:
     redirections = [">&-", "<&- >&- 2>&-", "2>/dev/full", "| true"]
     lines = [f"set -o pipefail; $B run tiny.toml -o {n}.h5 {to}" for n, to in enumerate(redirections)]
@@ -85,6 +87,7 @@ def test_outputs_elsewhere_are_written_and_the_case_is_never_replaced(here: Path
     assert (here / "r.h5").read_bytes() == before
 
 
+@campaign
 def test_a_deleted_working_directory_is_told(here: Path) -> None:
     gone = 'mkdir gone; cd gone; rmdir "$PWD"; $B '
     shell(f"{gone} run {here}/tiny.toml", here).told(74, "tiny.h5: cannot write: no such file or directory")

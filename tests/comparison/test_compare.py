@@ -33,6 +33,7 @@ from brakecli.errors import UsageError
 from brakecli.front.tables import comparison_table
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import NUMEROV, QUARTERS, SCHEMES, load
+from tests.campaign import campaign
 from tests.commands import ROOT, TINY, attributes, brakecli, left_in
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
@@ -170,6 +171,7 @@ def test_a_scheme_with_steps_of_its_own_climbs_tolerances() -> None:
     assert [(rung.step, rung.tolerance) for rung in rungs(two, [2e-5, 1e-5])] == [(2e-5, 0.0), (1e-5, 0.0)]
 
 
+@campaign
 def test_a_scheme_that_is_exact_is_one_entry_on_smooth_surfaces_alone() -> None:
     (exact,) = kinds(system_of(make(SQUEAL)), ["piecewise-exact"])
     assert rungs(exact, [1e-5]) == [exact]

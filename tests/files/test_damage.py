@@ -13,6 +13,7 @@ import pytest
 from brakecli.errors import UnreadableResultError
 from brakecli.files import read
 from brakecli.files.read import open_result
+from tests.campaign import campaign
 from tests.files.results import ROWS, in_a_process, read_all, write
 
 
@@ -50,6 +51,7 @@ def damaged(path: Path) -> None:
     assert refused > 1000
 
 
+@campaign
 def test_a_damaged_file_is_refused_or_read_exactly(tmp_path: Path) -> None:
     in_a_process(damaged, tmp_path / "r.h5")
 
@@ -103,6 +105,7 @@ def test_a_file_that_is_no_result_is_refused_with_the_reason(
     assert str(caught.value).startswith(f"{path}: ")
 
 
+@campaign
 def test_a_file_on_which_hdf5_never_ends_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In a heap of texts, free space that claims no length makes HDF5 read the same place again and again."""
     path = tmp_path / "r.h5"

@@ -23,6 +23,7 @@ import pytest
 from brakecli.errors import CannotWriteError, UsageError, escaped
 from brakecli.files.field import Field
 from brakecli.files.write import new_result
+from tests.campaign import campaign
 from tests.commands import ROOT
 from tests.files.results import command_of, fill, in_a_process, read_all, write
 
@@ -179,6 +180,7 @@ def interrupted(path: Path) -> None:
     assert signal.getsignal(signal.SIGTERM) is terminate
 
 
+@campaign
 def test_an_interruption_inside_hdf5_leaves_nothing_or_the_whole_file(tmp_path: Path) -> None:
     in_a_process(interrupted, tmp_path / "r.h5")
 
@@ -201,6 +203,7 @@ def interrupted_at_random(path: Path) -> None:
     assert stopped == 50
 
 
+@campaign
 def test_an_interruption_at_any_time_leaves_nothing_or_the_whole_file(tmp_path: Path) -> None:
     in_a_process(interrupted_at_random, tmp_path / "r.h5")
 

@@ -106,6 +106,7 @@ def test_numbers_at_ticks_are_texts_and_no_formulas() -> None:
     assert not any("$" in text for text in texts)
 
 
+@campaign
 def test_each_suffix_gives_a_whole_picture_of_its_kind_and_the_same_bytes_again(tmp_path: Path) -> None:
     result = write(tmp_path / "r.h5", sine(2000), frequency=1.0)
     for suffix in (".png", ".SVG", ".pdf"):
@@ -169,6 +170,7 @@ def test_envelope_is_the_least_and_greatest_value_of_each_column(
 
 
 @pytest.mark.parametrize("samples", [1, *(pytest.param(n, marks=campaign) for n in (2, 3, 160))])
+@campaign
 def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None:
     still = {"x": np.zeros(samples), "vx": np.zeros(samples), "state": np.full(samples, 2)}
     for number, moved in enumerate((still, sine(samples))):
@@ -182,6 +184,7 @@ def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None
 
 
 @pytest.mark.parametrize("scale", [1e-300, 1e149, *(pytest.param(s, marks=campaign) for s in (0.0, 1e-12, 1e9))])
+@campaign
 def test_motions_of_any_size_are_drawn(scale: float, tmp_path: Path) -> None:
     moved = {"x": scale * sine(500)["x"], "vx": scale * sine(500)["vx"], "state": np.full(500, 1)}
     plot_result(write(tmp_path / "r.h5", moved), tmp_path / "r.png", force=False)
@@ -218,6 +221,7 @@ def test_lines_stand_where_the_waves_of_a_steady_wheel_pass(tmp_path: Path) -> N
     assert gathered(tmp_path / "r.h5", sine(500), waves, changing).passing == ()
 
 
+@campaign
 def test_each_quantity_of_the_history_can_be_drawn(tmp_path: Path) -> None:
     assert {*VARIABLES} == {*HISTORY} - {"state"} | {"torque"}
     rng = np.random.default_rng(1)

@@ -15,6 +15,7 @@ from brakecli.plots import section as sections
 from brakecli.plots.result import draw
 from brakecli.plots.style import applied
 from brakecli.runs.run import run
+from tests.campaign import campaign
 from tests.examples import ROUGH, SQUEAL
 from tests.plots.helpers import points
 
@@ -106,6 +107,7 @@ def test_after_how_many_dots_the_waves_repeat_is_said(
     assert ("repeat together" in shown) == bool(words)
 
 
+@campaign
 def test_what_a_run_does_not_have_is_said(runs: dict[str, Path], tmp_path: Path) -> None:
     def said(path: Path, kind: str, variable: str = "") -> str:
         with open_result(path) as result, applied(), pytest.raises(UsageError) as caught:

@@ -182,6 +182,7 @@ def test_units_are_those_that_a_person_would_choose() -> None:
     assert stiff.named(7) == "link2.stiffness = 40 MN/m"
 
 
+@campaign
 def test_numbers_at_ticks_stand_apart(tmp_path: Path) -> None:
     long = {"parameter": "friction.coefficient", "values": [0.123456 + 0.1 * place for place in range(6)]}
     five = {"parameter": "wheel.radius", "values": [0.1, 0.2, 0.3, 0.4, 0.5]}
@@ -233,6 +234,7 @@ def test_no_power_of_ten_stands_at_the_end_of_an_axis_and_no_dot_at_that_of_a_li
     assert not any(text.get_text().endswith("·") for text in figure.texts)
 
 
+@campaign
 def test_any_number_of_a_sweep_is_drawn(tmp_path: Path) -> None:
     values = columns((8, 7), critical=True)
     values["steps"] = np.arange(56).reshape(8, 7)

@@ -11,6 +11,7 @@ from brakecli.errors import UsageError
 from brakecli.files.read import open_result
 from brakecli.plots import style, two
 from brakecli.runs.run import run
+from tests.campaign import campaign
 from tests.commands import TINY
 from tests.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
 
@@ -22,6 +23,7 @@ def picture(names: list[Path], variable: str = "") -> Any:
         return figure
 
 
+@campaign
 def test_the_last_cycles_of_both_runs_are_drawn_as_they_are_stored(tmp_path: Path) -> None:
     names = [tmp_path / "a.h5", tmp_path / "b.h5"]
     stored = []

@@ -271,6 +271,7 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
 
 
 @pytest.mark.parametrize("given", [False, pytest.param(True, marks=campaign)])
+@campaign
 def test_what_the_program_has_chosen_is_no_change_of_the_user(given: bool, tmp_path: Path, plain: None) -> None:
     """The interval of samples is a change where files give it; else it is named apart if its digits differ."""
     text = BASE if given else BASE.replace("output.sample_interval = 1e-4", "")
@@ -395,6 +396,7 @@ def test_a_map_holds_the_values_of_every_point(found: Page) -> None:
         assert amplitudes["values"][i][j] == 10.0 + 10.0 * (7 * i + j)
 
 
+@campaign
 def test_a_map_of_too_many_points_is_a_picture_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     assert sweep_map.MOST == 10_000
     monkeypatch.setattr(sweep_map, "MOST", 15)

@@ -21,6 +21,7 @@ from brakecli.files.read import open_result
 from brakecli.runs.limits import adjustments
 from brakecli.runs.run import RunReport, run
 from brakecli.solver.records import MOST_EVENTS
+from tests.campaign import campaign
 from tests.examples import COULOMB, SQUEAL
 from tests.solver.test_track import BOUNCING
 
@@ -87,6 +88,7 @@ def test_flight_begins_with_a_lift_off_and_ends_with_a_touch(tmp_path: Path) -> 
     assert ((flights.vy > 0.0) == (flights.kind == "lift-off")).all()
 
 
+@campaign
 def test_a_rough_pad_lifts_off_and_touches_on_its_motion(tmp_path: Path) -> None:
     """A straight line between samples misses a velocity by no more than it changes between them."""
     output = {"sample_interval": 1e-5, "events": True}

@@ -20,7 +20,7 @@ from brakecli.runs.own_error import SAFETY, Known, by_own_error, last_of
 from brakecli.solver.motion import Motion, solve
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import ROUGH, SQUEAL, make
 from tests.runs.test_tolerance import OPEN, promised
 
@@ -113,6 +113,7 @@ def test_a_dip_beside_the_end_of_a_step_is_no_longer_stepped_over() -> None:
     assert sticks == [1, 1]
 
 
+@campaign
 def test_an_event_that_may_have_been_missed_is_known() -> None:
     """It misses stick, or does not, by 1e-8 of the wheel's speed: coarse steps cannot tell, and say so."""
     system = system_of(Case.model_validate(cases.draw("near grazing", 7, 28).tables))

@@ -99,6 +99,7 @@ def test_the_resolved_case_repeats_the_run_without_the_file(tmp_path: Path) -> N
         assert all((result.read("history", name) == second[name]).all() for name in MOTION)
 
 
+@campaign
 def test_a_path_is_seen_from_the_file_of_the_case_in_sweeps_and_python_as_well(tmp_path: Path) -> None:
     folder = tmp_path / "inner"
     folder.mkdir()

@@ -27,6 +27,7 @@ from brakecli.solver.system import System
 from brakecli.sweeps.plan import parse_sweep
 from brakecli.sweeps.workers.task import compute_units
 from tests.analysis.test_verdicts import RINGS
+from tests.campaign import campaign
 from tests.commands import TINY, attributes, brakecli
 from tests.examples import ROUGH, SQUEAL, make
 from tests.sweeps.helpers import axis, inline, write_sweep
@@ -263,6 +264,7 @@ def test_the_limit_is_told_on_the_command_line_with_the_verdict(tmp_path: Path) 
     assert attributes(tmp_path / "open.h5")["regime"] == "undecided"
 
 
+@campaign
 def test_the_starter_of_hysteresis_finds_the_loop_of_the_branch(tmp_path: Path) -> None:
     """Vibration lasts on the way down where the limit cycle exists, on the way up where sliding is unstable."""
     (tmp_path / "branch.toml").write_text(starters()["branch"])

@@ -268,6 +268,7 @@ def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
     assert "What decides on critical friction" in shown
 
 
+@campaign
 def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> None:
     assert "run it with: brakecli scatter scatter.toml" in command("new", "scatter", cwd=tmp_path).out
     few = ("--set", "samples=64")
@@ -310,6 +311,7 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
     assert "in place of" in shown
 
 
+@campaign
 def test_a_study_and_its_result_are_loaded_in_python(tmp_path: Path) -> None:
     path = write_study(tmp_path, FRICTION, "samples = 16")
     study = brakecli.load(path, {"link2.angle_deg": 6.0})
@@ -328,6 +330,7 @@ def test_a_study_and_its_result_are_loaded_in_python(tmp_path: Path) -> None:
     command("plot", "study.toml", cwd=tmp_path).told(2, "brakecli scatter study.toml")
 
 
+@campaign
 def test_a_drawing_beside_all_samples_is_named(tmp_path: Path) -> None:
     """A normal distribution keeps 99.73 % within three deviations: 3.5 to 6.5 degrees."""
     write_study(tmp_path, FRICTION, ANGLE, "samples = 16")
@@ -509,6 +512,7 @@ def test_all_that_is_wrong_with_a_study_is_told_at_once_and_each_of_it_once(tmp_
     ]
 
 
+@campaign
 def test_per_cent_are_those_of_the_drawing(tmp_path: Path) -> None:
     """The case has 5 degrees, and 300 N·s/m in both links; advice is about the drawing that it is given."""
     both = DAMPING.replace("low = 200.0\nhigh = 400.0", "tolerance_percent = 20.0")

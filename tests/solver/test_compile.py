@@ -60,6 +60,7 @@ def test_a_second_process_finds_the_machine_code_of_the_first_and_gives_no_notic
     assert {path: path.stat().st_mtime_ns for path in cache.rglob("*.nbc")} == stored
 
 
+@campaign
 def test_the_notice_comes_once_and_before_the_first_kernel_is_kept(tmp_path: Path) -> None:
     program = """
 from pathlib import Path
@@ -71,11 +72,13 @@ from brakecli.solver import friction
     assert len([*tmp_path.rglob("*.nbc")]) > 1
 
 
+@campaign
 def test_a_kind_of_kernels_that_a_warm_cache_lacks_brings_the_notice(cache: Path) -> None:
     another = COUNT.format(limit="").replace("import friction", "import friction, double_double")
     assert [python(another, cache).split()[-1] for _ in range(2)] == ["True", "False"]
 
 
+@campaign
 def test_python_compiles_in_silence(tmp_path: Path) -> None:
     environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
     words = [sys.executable, "-c", "import brakecli.solver.friction"]
@@ -84,6 +87,7 @@ def test_python_compiles_in_silence(tmp_path: Path) -> None:
     assert any(tmp_path.rglob("*.nbc"))
 
 
+@campaign
 def test_kernels_compile_without_a_cache_where_the_disk_is_full(tmp_path: Path) -> None:
     out = python(COUNT.format(limit="resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))"), tmp_path)
     assert out.splitlines()[0] == "(2.0, 0.0, 1.0)"
@@ -100,6 +104,7 @@ print(len(implicit_step.newton.overloads), len(implicit_step._try_force.overload
 """
 
 
+@campaign
 def test_a_kernel_for_kernels_alone_is_compiled_with_its_caller_and_never_loaded(tmp_path: Path) -> None:
     assert [python(LOADED, tmp_path) for _ in range(2)] == ["1 1\n", "1 0\n"]
 
@@ -181,13 +186,14 @@ def noise(data: bytes) -> bytes:
     ("ending", "change"),
     [
         ("nbc", noise),
-        pytest.param("nbi", noise, marks=campaign),
-        pytest.param("nbc", lambda data: data[:-1] + bytes([data[-1] ^ 1]), marks=campaign),
-        pytest.param("nbi", lambda data: b"", marks=campaign),
-        pytest.param("nbc", lambda data: b"", marks=campaign),
-        pytest.param("nbc", lambda data: b"\x80\x04K\x01.", marks=campaign),
+        ("nbi", noise),
+        ("nbc", lambda data: data[:-1] + bytes([data[-1] ^ 1])),
+        ("nbi", lambda data: b""),
+        ("nbc", lambda data: b""),
+        ("nbc", lambda data: b"\x80\x04K\x01."),
     ],
 )
+@campaign
 def test_a_damaged_cache_is_compiled_anew(cache: Path, ending: str, change: Callable[[bytes], bytes]) -> None:
     damaged = {path: change(path.read_bytes()) for path in cache.rglob(f"*.{ending}")}
     for path, contents in damaged.items():
@@ -208,6 +214,7 @@ def test_the_files_of_a_kernel_are_not_taken_for_those_of_another(cache: Path) -
     assert len(one.read_bytes()) == len(kept)
 
 
+@campaign
 def test_a_cache_that_others_may_write_is_not_used(cache: Path, tmp_path: Path) -> None:
     (folder,) = (cache / "brakecli").iterdir()
     assert folder.stat().st_mode & 0o077 == 0
@@ -227,6 +234,7 @@ from brakecli.solver import friction
 """
 
 
+@campaign
 def test_a_process_that_keeps_the_lock_is_waited_for_no_longer_than_a_limit_and_is_named(tmp_path: Path) -> None:
     python("from brakecli.solver import compile", tmp_path)
     (folder,) = (tmp_path / "brakecli").iterdir()
@@ -239,6 +247,7 @@ def test_a_process_that_keeps_the_lock_is_waited_for_no_longer_than_a_limit_and_
     assert any(folder.rglob("*.nbc"))
 
 
+@campaign
 def test_a_process_waits_for_the_kernels_alone_that_another_one_compiles(cache: Path) -> None:
     """Those of friction are locked by their names; others are compiled meanwhile."""
     (folder,) = (cache / "brakecli").iterdir()
@@ -255,6 +264,7 @@ def test_a_process_waits_for_the_kernels_alone_that_another_one_compiles(cache: 
 @pytest.mark.parametrize(
     "kind", ["of others", *(pytest.param(kind, marks=campaign) for kind in ("a file", "a link", "read-only"))]
 )
+@campaign
 def test_a_cache_that_cannot_be_used_is_named_with_the_remedy(tmp_path: Path, kind: str) -> None:
     python("from brakecli.solver import compile", tmp_path)
     (folder,) = (tmp_path / "brakecli").iterdir()

@@ -12,7 +12,7 @@ from brakecli.solver import contact
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage, full_contact, full_press
 from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps, outputs, unfilled
 
 # Case B of the roughness: five waves on each surface.
@@ -29,6 +29,7 @@ def case_b(x: float, y: float, travel: float) -> Gap:
 
 @given(gaps())
 @settings(max_examples=120)
+@campaign
 def test_exact_agrees_with_quadrature_between_the_roots(gap: Gap) -> None:
     found, k, length = gap.evaluate("exact"), gap.k, 2 * gap.a
     delta, height, steep = gap.rounding, abs(gap.y) + gap.crest, gap.steepest(wheel_only=True)
@@ -108,6 +109,7 @@ def test_the_shoe_s_own_roughness_drops_out_of_full_contact_but_for_a_constant(
 
 
 @given(gaps(), st.sampled_from([64, 128, 512]))
+@campaign
 def test_the_midpoint_rule_errs_downwards_and_by_no_more_than_its_kinks_explain(gap: Gap, nodes: int) -> None:
     """On a cell the rule takes max(mean gap, 0), at most the mean of max(gap, 0); they differ only where the gap
     changes its sign in the cell, by min(∫ gap+, ∫ gap-) <= slope spacing²/8.
@@ -125,6 +127,7 @@ def test_the_midpoint_rule_errs_downwards_and_by_no_more_than_its_kinks_explain(
     assert found.fraction == pytest.approx(found.stiffness / (2 * gap.a * gap.k), rel=4 * EPS)
 
 
+@campaign
 def test_the_midpoint_error_falls_with_the_square_of_the_spacing() -> None:
     """A root where the gap has the slope s, at v spacings from the nearest edge of a cell, makes the force
     k |s| spacing² v²/2 too small. v is uniform in 0 ... 1/2, so that the mean error is k spacing² sum |s| / 24.
@@ -150,6 +153,7 @@ def test_the_midpoint_error_falls_with_the_square_of_the_spacing() -> None:
     assert 0.25 < np.mean(forces > 0) <= 1.0
 
 
+@campaign
 def test_default_nodes_keep_the_force_to_a_few_parts_in_ten_thousand() -> None:
     """The figure that NODES_PER_WAVE is chosen by: rms 3e-4 of 2ak (sum of amplitudes) over random surfaces and
     positions. It can never exceed 2 pi/(4 NODES_PER_WAVE²): two roots per shortest wave, slopes <= 2 pi/wave.
@@ -197,6 +201,7 @@ def test_stiffness_is_the_force_s_derivative(gap: Gap, evaluator: str, part: flo
 
 
 @given(gaps(least=1), st.sampled_from(EVALUATORS))
+@campaign
 def test_tangential_is_the_force_s_derivative_along_the_wheel(gap: Gap, evaluator: str) -> None:
     """Between x - eta and x + eta the slope under the pad changes by eta times f2's curvature, and the touching
     set by no more than the gap moves: what touches at y - eta slope but not at y + eta slope.

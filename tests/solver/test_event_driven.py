@@ -107,7 +107,7 @@ def test_flat_motions_are_exact_through_stick_and_lift_off(motions: int) -> None
     assert both >= 0.5 * motions
 
 
-@pytest.mark.parametrize("motions", counts(15, 60))
+@pytest.mark.parametrize("motions", counts(5, 60))
 def test_overcritical_dashpots_leave_the_tolerance_between_steps(motions: int) -> None:
     """Steps at the limit of stability end where they should, but what they give in between is wrong by 3e-7."""
     rng = np.random.default_rng(5)
@@ -140,7 +140,7 @@ def rough_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, An
     return case, omega
 
 
-@pytest.mark.parametrize("motions", counts(3, 6))
+@pytest.mark.parametrize("motions", counts(0, 6))
 def test_rough_motions_agree_with_an_independent_solver(motions: int) -> None:
     # scipy's error estimate is blind to kinks at certain places of a step: its tolerance of 1e-12 alone leaves
     # errors of up to 1e-8. A longest step of 0.002/ω bounds what a kink can do there.

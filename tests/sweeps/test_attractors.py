@@ -21,6 +21,7 @@ from brakecli.sweeps.plan import LoadedSweep, parse_sweep
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.task import compute_units
 from tests.branches.smooth_shoes import FRICTION, followed
+from tests.campaign import campaign
 from tests.sweeps.helpers import axis, inline, interrupted, write_sweep
 from tests.sweeps.made_up import CYCLE, DAMPED, FORCED, made_of, swept
 
@@ -214,6 +215,7 @@ def test_many_undecided_points_are_told_with_their_most_frequent_reason_and_the_
 
 
 @pytest.mark.usefixtures("compiled")
+@campaign
 def test_a_sweep_in_memory_has_its_attractors_and_is_drawn(tmp_path: Path) -> None:
     """What a file holds in a group of its own is an attribute there, which a copy by xarray keeps."""
     basin(tmp_path, [0.5])

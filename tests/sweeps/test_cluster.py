@@ -112,7 +112,7 @@ def test_a_cluster_gives_the_bytes_of_a_sweep_at_home(cluster: Cluster, good: Pa
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
 
 
-@pytest.mark.parametrize("method", ["eigenvalue", pytest.param("run", marks=campaign)])
+@pytest.mark.parametrize("method", ["eigenvalue", "run"])
 @campaign
 def test_so_does_a_study_of_scatter(cluster: Cluster, tmp_path: Path, method: str) -> None:
     (tmp_path / "case.toml").write_text(TINY)
@@ -198,7 +198,8 @@ def test_a_point_that_ends_its_worker_is_marked_and_all_others_are_computed(tmp_
 # interruptions
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=campaign)])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@campaign
 def test_a_signal_ends_a_sweep_whose_points_are_kept(
     cluster: Cluster, good: Path, here: Path, number: signal.Signals
 ) -> None:
@@ -214,7 +215,8 @@ def test_a_signal_ends_a_sweep_whose_points_are_kept(
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, pytest.param(signal.SIGTERM, marks=campaign)])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@campaign
 def test_a_signal_ends_the_wait_for_a_scheduler(tmp_path: Path, number: signal.Signals) -> None:
     write_sweep(tmp_path, frictions(4))
     with started("sweep", "s.toml", "--scheduler", "tcp://127.0.0.1:9", cwd=tmp_path) as process:
@@ -301,7 +303,7 @@ def test_a_scheduler_that_dies_ends_the_sweep_with_a_sentence(here: Path) -> Non
     assert left_in(here) - {"dask"} == {"tiny.toml", "s.toml", "s.h5.partial"}
 
 
-@pytest.mark.parametrize("before", ["", pytest.param(LATE, marks=campaign)])
+@pytest.mark.parametrize("before", ["", LATE])
 @campaign
 def test_a_cluster_without_workers_is_waited_for_and_then_given_up(here: Path, before: str) -> None:
     with cluster_of(here / "dask") as cluster:

@@ -203,6 +203,7 @@ def test_there_is_no_early_verdict_where_a_whole_run_may_see_something_else(chan
     assert early(system_of(case_of(RELAXATION, EXACT, *changes))) is None
 
 
+@campaign
 def test_a_point_takes_less_than_200_bytes_of_journal_and_of_result(tmp_path: Path) -> None:
     case, sizes = TINY.replace("step = 1e-5, duration = 0.02", "tolerance = 1e-3, duration = 1.0"), []
     speeds = axis("wheel.angular_speed", "start=0.1", "stop=2.0", "num=20")
@@ -218,7 +219,8 @@ def test_a_point_takes_less_than_200_bytes_of_journal_and_of_result(tmp_path: Pa
     assert sizes[1] - sizes[0] < 360 * 200  # what all results have in common takes 60 kB
 
 
-@pytest.mark.parametrize("followed", ["first", *(pytest.param(each, marks=campaign) for each in ("none", "last"))])
+@pytest.mark.parametrize("followed", ["first", "none", "last"])
+@campaign
 def test_a_result_of_many_blocks_holds_every_point_in_its_place(tmp_path: Path, followed: str) -> None:
     """`quick` numbers points as they are computed: along the followed axis first."""
     direction = 'direction = "both"'

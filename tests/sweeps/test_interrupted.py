@@ -18,7 +18,7 @@ from tests.sweeps.helpers import PROGRAM, alive, journal_size, workers
     [
         (signal.SIGINT, True, 0.05),
         pytest.param(signal.SIGTERM, True, 0.6, marks=campaign),
-        (signal.SIGTERM, False, 1.0),
+        pytest.param(signal.SIGTERM, False, 1.0, marks=campaign),
         pytest.param(signal.SIGINT, True, 0.3, marks=campaign),
         pytest.param(signal.SIGINT, False, 0.6, marks=campaign),
         pytest.param(signal.SIGINT, True, 1.0, marks=campaign),
@@ -40,6 +40,7 @@ def test_a_signal_ends_a_sweep_soon_and_in_one_sentence(
     assert left_in(here) <= {"tiny.toml", "s.toml", "s.h5.partial"}
 
 
+@campaign
 def test_a_signal_is_heard_while_a_worker_that_starts_slowly_is_waited_for(here: Path) -> None:
     """It is stopped before it can take the large cases of its sweep, which fill the pipe to it."""
     with started("large", here / "s.toml", cwd=ROOT, command=PROGRAM) as process:

@@ -92,6 +92,7 @@ def test_finished_points_of_another_sweep_are_refused_and_the_key_named(
     assert left_in(tmp_path) == {"tiny.toml", "s.toml", "s.h5"}
 
 
+@campaign
 def test_the_command_names_the_key_that_has_changed_and_starts_anew_with_force(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
@@ -150,6 +151,7 @@ def test_a_journal_that_ends_within_a_block_loses_that_block_alone(tmp_path: Pat
     assert inline(loaded, tmp_path / "s.h5").resumed == 3
 
 
+@campaign
 def test_damaged_records_of_a_journal_are_computed_again(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(20))
     inline(loaded, tmp_path / "expected.h5")

@@ -46,9 +46,8 @@ def variable(path: Path, name: str) -> Any:
         return file[name][:]
 
 
-@pytest.mark.parametrize(
-    "kills", [(False, True), pytest.param((False, True, False, True, True), marks=campaign)], ids=len
-)
+@pytest.mark.parametrize("kills", [(False, True), (False, True, False, True, True)], ids=len)
+@campaign
 def test_a_killed_sweep_ends_with_the_bytes_of_an_undisturbed_one(
     good: Path, here: Path, kills: tuple[bool, ...]
 ) -> None:

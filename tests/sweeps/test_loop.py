@@ -119,6 +119,7 @@ def test_a_loop_that_short_runs_miss_altogether_is_told(tmp_path: Path) -> None:
     assert f"at 4 points, {FRICTION} = 0.515 to 0.525, {GROWN}" in told
 
 
+@campaign
 def test_one_way_is_looked_at_as_well_and_points_that_are_not_followed_are_not(tmp_path: Path) -> None:
     shoe = Followed(tmp_path, WIDE)
     (told,) = shoe.loop(NARROW, 0.02, "up").told

@@ -83,6 +83,7 @@ FOLD: dict[str, Any] = {  # where growth jumps rounding makes narrow windows
         pytest.param(BEYOND, 2.6, [0.54877, 0.64997, 1.30638, 1.30884, 2.6], marks=campaign),
     ],
 )
+@campaign
 def test_windows_that_multipliers_open_where_they_meet_are_found(
     tables: dict[str, Any], upper: float, truth: list[float]
 ) -> None:

@@ -34,7 +34,8 @@ SWEEPS = {
 }
 
 
-@pytest.mark.parametrize("name", [pytest.param(n, marks=() if n == "grid" else campaign) for n in SWEEPS])
+@pytest.mark.parametrize("name", SWEEPS)
+@campaign
 def test_no_way_of_computing_a_sweep_changes_a_byte(tmp_path: Path, name: str) -> None:
     loaded = write_sweep(tmp_path, *SWEEPS[name])
     inline(loaded, tmp_path / "s.h5", compute_units)

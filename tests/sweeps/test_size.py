@@ -12,6 +12,7 @@ from tests.sweeps.helpers import axis, frictions, program, write_sweep
 pytestmark = pytest.mark.usefixtures("compiled")
 
 
+@campaign
 def test_a_sweep_of_a_billion_points_is_refused_at_once_with_its_size(tmp_path: Path) -> None:
     names = ("friction.coefficient", "link2.angle_deg", "shoe.mass")
     billions = {

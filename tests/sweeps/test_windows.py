@@ -74,6 +74,7 @@ def exact_growth(tables: dict[str, Any], **changes: Any) -> float:
     return math.log(float(np.abs(np.linalg.eigvals(multipliers)).max())) / float(period)
 
 
+@campaign
 def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_path: Path) -> None:
     """More damping closes one of them; a bound of the range cuts that one, which ends there."""
     table = {
@@ -106,6 +107,7 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
     np.testing.assert_allclose(segments[:, -1], upper[np.isfinite(upper)])
 
 
+@campaign
 def test_the_third_harmonic_of_a_wave_under_an_opening_pad_is_found() -> None:
     """Multipliers of another integrator pass -1 at 6.2833 and at 6.3431 rad/s, where 3 waves pass in 2 cycles."""
     tables: dict[str, Any] = {
