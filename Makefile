@@ -12,6 +12,9 @@ LOWEST_STAMP := $(LOWEST)/.installed
 PEERS := $(VENV)/bench
 PEERS_STAMP := $(PEERS)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
+# pip would compile all of the libraries, ten times what is imported. Python does it as they are, and keeps that.
+INSTALL := $(PIP) install --no-compile --editable
+unexport PYTHONDONTWRITEBYTECODE
 CASES := $(sort $(wildcard cases/*.toml))
 # Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
 PYTEST := -m pytest --numprocesses 3 --dist loadfile
@@ -46,16 +49,16 @@ INSTALLED_FROM := pyproject.toml brakecli/about.py $(BIN)/python
 
 $(RUN_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli into $(VENV) ..."
-	@$(PIP) install --editable '.[tour]'
+	@$(INSTALL) '.[tour]'
 	@touch $@
 
 $(DEV_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli and its development tools into $(VENV) ..."
-	@$(PIP) install --editable '.[dev]'
+	@$(INSTALL) '.[dev]'
 	@touch $@ $(RUN_STAMP)
 
 $(DOCS_STAMP): $(DEV_STAMP)
-	@$(PIP) install --editable '.[docs]'
+	@$(INSTALL) '.[docs]'
 	@touch $@
 
 $(LOWEST_STAMP): $(INSTALLED_FROM)
