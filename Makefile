@@ -16,8 +16,8 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 INSTALL := $(PIP) install --no-compile --editable
 unexport PYTHONDONTWRITEBYTECODE
 CASES := $(sort $(wildcard cases/*.toml))
-# Two processes: one test waits for what it has started while another computes. PYTEST_ARGS=-n0 takes one alone.
-PYTEST := -m pytest --numprocesses 3 --dist loadfile
+# Two processes compile the kernels from both ends. PYTEST_ARGS=-n0 takes one alone.
+PYTEST := -m pytest --numprocesses 2 --dist loadfile
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
 POINTS ?=
@@ -92,7 +92,7 @@ test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
 	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
 campaign: $(DEV_STAMP) docs ## run long tests and statistics, of most of which make test has a smaller part (25 minutes)
-	$(BIN)/python $(PYTEST) -m campaign $(PYTEST_ARGS)
+	$(BIN)/python $(PYTEST) -n3 -m campaign $(PYTEST_ARGS) # one more, as many of these wait for seconds
 
 lowest: $(LOWEST_STAMP) ## run the tests with every dependency at the lowest version that pyproject.toml declares
 	$(LOWEST)/bin/python $(PYTEST) $(PYTEST_ARGS)

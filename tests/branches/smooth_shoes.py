@@ -34,9 +34,9 @@ def drawn(seed: int) -> Iterator[tuple[Tables, float]]:
 
 
 @cache
-def first(seed: int, number: int) -> tuple[Tables, ...]:
-    """The first of these shoes; they take a seventh of a second each."""
-    return tuple(tables for tables, _ in islice(drawn(seed), number))
+def numbered(seed: int, number: int) -> Tables:
+    """One of the random shoes on smooth pads; those before it are drawn as well, 30 in a second."""
+    return next(islice(random_shoes("smooth", seed), number, None))
 
 
 def changed(tables: Tables, key: str, value: float) -> Tables:

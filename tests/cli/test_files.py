@@ -102,7 +102,7 @@ def test_as_many_values_as_directions_are_exported(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     axis = 'parameter = "friction.coefficient"\nvalues = [0.5, 0.6]\ndirection = "both"\n'
     (tmp_path / "s.toml").write_text(f'case = "tiny.toml"\n[[axis]]\n{axis}')
-    brakecli("sweep", "s.toml", "-q", "-j", "1", cwd=tmp_path).told(0)
+    brakecli("sweep", "s.toml", "-q", cwd=tmp_path).told(0)
     brakecli("export", "s.h5", cwd=tmp_path).told(0)
     head, *rows = csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
     rows = [head, *rows]
@@ -143,7 +143,7 @@ def test_the_windows_of_a_stop_are_exported(tmp_path: Path) -> None:
 def test_a_sweep_and_modes_are_a_row_for_each_point(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     (tmp_path / "grid.toml").write_text(GRID)
-    brakecli("sweep", "grid.toml", "-q", "-j", "1", cwd=tmp_path).told(0)
+    brakecli("sweep", "grid.toml", "-q", cwd=tmp_path).told(0)
     brakecli("export", "grid.h5", cwd=tmp_path).told(0)
     table = pandas.read_csv(tmp_path / "grid.csv")
     assert table["link2_angle_deg (deg)"].tolist() == [3.0] * 3 + [6.0] * 3

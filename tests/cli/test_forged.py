@@ -46,7 +46,7 @@ def results(good: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("results")
     (folder / "tiny.toml").write_text(TINY)
     (folder / "s.toml").write_text(GRID)
-    brakecli("sweep", "s.toml", "-q", "-j", "1", "-o", "sweep.h5", cwd=folder).told(0)
+    brakecli("sweep", "s.toml", "-q", "-o", "sweep.h5", cwd=folder).told(0)
     schemes = ["--schemes", "two-layer", "--steps", "1e-4,5e-5", "--budget", "1"]
     brakecli("compare-schemes", "tiny.toml", "-q", "-o", "comparison.h5", *schemes, cwd=folder).told(0)
     vary = ["--vary", "friction.coefficient=0.5:0.7:3"]

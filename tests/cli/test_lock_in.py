@@ -60,6 +60,7 @@ def test_the_same_numbers_are_in_json_in_the_file_and_in_a_spreadsheet(here: Pat
     assert numbers["vary"][-1]["growth_rates"] == pytest.approx([growth, -growth], abs=1e-12)
 
 
+@campaign
 def test_the_picture_shows_both_modes_and_where_stability_changes(here: Path) -> None:
     assert (here / "d.png").stat().st_size > 10_000
     above, below = panels(here / "d.h5")

@@ -19,6 +19,7 @@ from brakecli.front import progress
 from brakecli.front.tables import grid, verdict_table
 from brakecli.scattering.study import parse_study
 from brakecli.sweeps.plan import parse_sweep
+from tests.campaign import campaign
 from tests.commands import COMMAND, LONG, ROOT, TINY, attributes, brakecli, each, environment, left_in
 
 
@@ -116,6 +117,7 @@ def test_long_work_without_a_terminal_says_a_line_now_and_then(
     assert capsys.readouterr().err == ""
 
 
+@campaign
 def test_a_signal_takes_the_bar_away_and_gives_the_cursor_back(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     terminal, stderr = pty.openpty()

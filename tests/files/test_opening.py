@@ -23,6 +23,7 @@ from brakecli.files.opening import contents, opened
 from brakecli.files.read import digest, open_result
 from brakecli.files.table import TextTable
 from brakecli.files.trust import readings
+from tests.campaign import campaign
 from tests.files.results import write
 
 
@@ -80,6 +81,7 @@ def test_xarray_follows_no_link(tmp_path: Path) -> None:
         as_xarray(path)
 
 
+@campaign
 def test_damage_on_which_hdf5_never_ends_is_refused_though_its_digest_fits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

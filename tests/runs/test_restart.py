@@ -61,6 +61,7 @@ def test_two_runs_are_as_one(case: dict[str, Any], bound: float, tmp_path: Path)
     assert apart(case, tmp_path) < bound
 
 
+@campaign
 def test_a_three_layer_scheme_misses_by_the_third_power_of_its_step(tmp_path: Path) -> None:
     """The file has one level of two; the other is that of the consistent start, whose error is h⁴, in vx h³."""
     steps = ("solver.step=1e-5", "solver.step=5e-6")

@@ -157,9 +157,8 @@ def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> No
     assert address(kernel) == compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) != 0
 
 
-@pytest.mark.parametrize(
-    ("before", "found"), [("", "False"), pytest.param("import scipy.linalg.cython_blas", "True", marks=campaign)]
-)
+@pytest.mark.parametrize(("before", "found"), [("", "False"), ("import scipy.linalg.cython_blas", "True")])
+@campaign
 def test_kernels_load_no_blas_and_leave_it_to_those_of_others(cache: Path, before: str, found: str) -> None:
     dot = "numba.njit(lambda a: numpy.dot(a, a))(numpy.ones(3))"
     program = f"""
@@ -261,9 +260,7 @@ def test_a_process_waits_for_the_kernels_alone_that_another_one_compiles(cache: 
     assert indices
 
 
-@pytest.mark.parametrize(
-    "kind", ["of others", *(pytest.param(kind, marks=campaign) for kind in ("a file", "a link", "read-only"))]
-)
+@pytest.mark.parametrize("kind", ["of others", "a file", "a link", "read-only"])
 @campaign
 def test_a_cache_that_cannot_be_used_is_named_with_the_remedy(tmp_path: Path, kind: str) -> None:
     python("from brakecli.solver import compile", tmp_path)

@@ -43,7 +43,7 @@ def drawn(system: System, chance: np.random.Generator) -> tuple[Floats, float]:
     return state, chance.uniform(0.05, 2.0) / system.natural_frequencies[0]
 
 
-@pytest.mark.parametrize("number", counts(5, 1000))
+@pytest.mark.parametrize("number", counts(5, 300, 1000))
 def test_the_derivative_is_that_of_central_differences(number: int) -> None:
     """Differences by 1e-5 of the sizes are off by its square, and by rounding: 1e-16 over 1e-5.
 

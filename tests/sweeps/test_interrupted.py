@@ -68,6 +68,7 @@ def test_an_interrupted_sweep_is_resumed_by_the_same_command(good: Path, here: P
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
 
 
+@campaign
 def test_a_second_sweep_into_the_same_output_is_refused_and_names_the_first(here: Path) -> None:
     with started("sweep", "s.toml", "-q", "-j", "1", cwd=here) as first:
         wait_until(lambda: journal_size(here) > 2000)

@@ -96,7 +96,7 @@ def test_finished_points_of_another_sweep_are_refused_and_the_key_named(
 def test_the_command_names_the_key_that_has_changed_and_starts_anew_with_force(tmp_path: Path) -> None:
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
-    command = ["sweep", "s.toml", "--set", "friction.coefficient=0.5", "--set", "shoe.mass=11.0", "-j", "1"]
+    command = ["sweep", "s.toml", "--set", "friction.coefficient=0.5", "--set", "shoe.mass=11.0"]
     refused = brakecli(*command, cwd=tmp_path).told(3, "s.h5.partial: holds finished points of another sweep: ")
     assert "friction.coefficient was 0.6, is 0.5" in refused
     assert "shoe.mass was 10.0, is 11.0" in refused
@@ -119,7 +119,7 @@ def test_a_journal_of_the_same_sweep_is_taken_up(tmp_path: Path) -> None:
     """The control of the refusals above: without a change the very same journal is used."""
     loaded = write_sweep(tmp_path, frictions(20))
     interrupted(loaded, tmp_path / "s.h5", compute_units, limit=4, task_size=3)
-    done = brakecli("sweep", "s.toml", "--json", "-j", "1", cwd=tmp_path)
+    done = brakecli("sweep", "s.toml", "--json", cwd=tmp_path)
     assert done.told(0).endswith("; 12 of them are there already\n")
     assert done.json["resumed_points"] == 12
 

@@ -128,7 +128,7 @@ def test_points_and_axes_exclude_each_other(tmp_path: Path) -> None:
 
 def test_a_listed_sweep_from_the_shell(tmp_path: Path) -> None:
     listed(tmp_path)
-    shown = command("sweep", "s.toml", "-j", "1", cwd=tmp_path).out
+    shown = command("sweep", "s.toml", cwd=tmp_path).out
     assert "friction.coefficient  link2.angle_deg  solver.scheme" in shown
     assert "piecewise-exact" in shown
     assert "s.png: written" in command("plot", "s.h5", cwd=tmp_path).out

@@ -93,6 +93,7 @@ def test_windows_that_multipliers_open_where_they_meet_are_found(
     assert found.error < 2e-3 * upper
 
 
+@campaign
 def test_a_value_is_stable_where_one_sheet_of_the_branch_is_and_all_ends_are_listed() -> None:
     """By another integrator the small motion is unstable from 1.71369 to 1.74247, and it ends at 1.76694. One of
     twice its amplitude is stable there. At 1.73 the largest multipliers are 0.99452 for it and 1.00356.
