@@ -42,6 +42,7 @@ $(BIN)/python:
 	    || { rm -rf $(VENV); \
 	         echo "cannot create $(VENV); is Python's venv module installed (python3-venv on Debian)?" >&2; \
 	         exit 1; }
+	@$(PIP) install --upgrade pip || true # older ones search twice as long for what fits together
 
 # The installation is editable: it always runs the code that is here. It is renewed when the dependencies, the version
 # or the Python have changed.

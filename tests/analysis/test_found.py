@@ -219,6 +219,7 @@ def test_a_stick_of_less_than_a_sample_is_not_said_to_be_none(times: float) -> N
     assert abs(verdict.stick_fraction - 0.0270) <= verdict.evidence["stick_spread"]  # by located events
 
 
+@campaign
 def test_what_ripple_of_the_nodes_feeds_is_not_called_self_excited() -> None:
     """A wave passes under the nodes at 483 Hz, the shoe's own is 457 Hz. It dies by another integrator."""
     for nodes in (192, 768):

@@ -19,6 +19,7 @@ from tests.analysis.shoes import Shoe as Drawn
 from tests.analysis.shoes import Tables
 from tests.branches.phasewise import AHEAD, BEHIND, OPEN, STICK, Phasewise
 from tests.branches.smooth_shoes import FRICTION, changed, cycle_of, drawn
+from tests.campaign import campaign
 from tests.examples import make
 from tests.sweeps.shoes import drawn as rough_drawn
 
@@ -36,7 +37,10 @@ def of_smooth(friction: float, tables: Tables = HYSTERETIC) -> tuple[Shoe, Any]:
     return shoe, system.initial.beside(shoe.rest)
 
 
-@pytest.mark.parametrize(("friction", "lasts"), [(0.17, False), (0.18, True), (0.33, True)])
+@pytest.mark.parametrize(
+    ("friction", "lasts"),
+    [(0.18, True), *(pytest.param(*each, marks=campaign) for each in ((0.17, False), (0.33, True)))],
+)
 def test_a_motion_on_smooth_pads_comes_to_what_another_scheme_shows(friction: float, lasts: bool) -> None:
     end = on_smooth_pads(*of_smooth(friction))
     assert end.lasts is lasts

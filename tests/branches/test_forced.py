@@ -307,6 +307,7 @@ def rough_shoe(amplitude: float) -> Line:
 
 
 @pytest.mark.parametrize("amplitude", [6e-5, 8e-4])
+@campaign
 def test_cycles_of_a_rough_shoe_begin_at_flutter_and_close(amplitude: float) -> None:
     """It touches everywhere in steady sliding, or in part. Where it touches everywhere flutter is that of modes.
 

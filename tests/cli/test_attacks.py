@@ -51,7 +51,7 @@ vx = -0.5
 """
 
 
-@pytest.mark.parametrize("number", counts(50, 1000, 5000))
+@pytest.mark.parametrize("number", counts(20, 1000, 5000))
 def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
     number: int, here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:

@@ -105,6 +105,7 @@ def test_the_file_holds_what_json_says_and_opens_in_xarray(here: Path, found: di
     assert tree.attrs["coexists_from"] == found["coexists_from"]
 
 
+@campaign
 def test_steady_sliding_is_full_up_to_its_flutter_and_dashed_beyond(here: Path, found: dict[str, Any]) -> None:
     with open_result(here / "branch.h5") as stored, applied():
         upper, lower = draw(stored).axes

@@ -143,6 +143,7 @@ def test_no_cell_of_a_table_is_a_formula_and_none_holds_control_characters(good:
     assert cells == ["'=1+1", "'+1", "'-x", "'@x", "\\u001b[31m", "' =2", "plain", "'-1.5"]
 
 
+@campaign
 def test_limits_hold_where_the_work_is_done(good: Path, here: Path) -> None:
     brakecli("advise", "tiny.toml", "--set", "output.sample_interval=1e20", cwd=here).told(
         3, "the run is too long"

@@ -189,6 +189,7 @@ def test_many_signals_at_once_leave_nothing_either(here: Path) -> None:
     assert left_in(here) == {"tiny.toml"}
 
 
+@campaign
 def test_a_second_ctrl_c_ends_with_the_same_code(here: Path) -> None:
     with started("run", "tiny.toml", *LONG, cwd=here) as process:
         wait_until((here / ".tiny.h5.part").exists)

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from brakecli.case.read import parse_case
 from brakecli.errors import CaseError
 from brakecli.files.toml_lines import Located
+from tests.campaign import campaign
 from tests.case.examples import CONSTANT, change, messages, where
 
 
@@ -172,6 +173,7 @@ DOCUMENTS = st.dictionaries(st.text("ab.\"'\n #[]=é", max_size=4), TREES, max_s
 
 
 @given(DOCUMENTS)
+@campaign
 def test_statement_by_statement_a_text_says_the_same_as_in_one_piece(document: dict[str, Any]) -> None:
     text = tomli_w.dumps(document)
     located = Located(text)

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.plots.style import DARK, applied
+from tests.campaign import campaign
 from tests.plots.helpers import ANGLE, CRITICAL, REGIMES, columns, drawn, gathered, legend, panels, points, write
 from tests.sweeps.helpers import axis
 from tests.sweeps.made_up import CYCLE, DAMPED, swept
@@ -27,6 +28,7 @@ def test_critical_values_and_their_error_bars_are_those_of_the_file(tmp_path: Pa
     assert axes.get_ylabel() == "critical friction.coefficient"
 
 
+@campaign
 def test_points_without_a_critical_value_are_marked_by_their_reason(tmp_path: Path) -> None:
     values = columns((8,), critical=True)
     reasons = ["stable throughout", "unstable throughout", "no steady sliding", ""]
@@ -64,6 +66,7 @@ def test_a_search_by_eigenvalues_alone_has_no_error_bars(tmp_path: Path) -> None
     assert legend(figure) == ["by eigenvalues"]
 
 
+@campaign
 def test_a_search_that_no_run_measured_is_not_called_a_simulation(tmp_path: Path) -> None:
     values = columns((8,), critical=True)
     values["critical"] = values["critical_eigenvalue"]
@@ -133,6 +136,7 @@ def test_a_long_legend_takes_more_rows_and_stays_inside_the_figure(tmp_path: Pat
     assert found.get_window_extent().y0 > figure.axes[0].get_window_extent().y1
 
 
+@campaign
 def test_curves_over_initial_states_have_the_colours_of_their_attractors(tmp_path: Path) -> None:
     """So have those of a list over one key, whose points are drawn in the order of its values."""
     made = [CYCLE, {**CYCLE, "amplitude": 2e-5}, DAMPED, {**CYCLE, "settled": 0}, CYCLE]

@@ -9,6 +9,7 @@ import pytest
 from brakecli.files.read import open_result
 from brakecli.plots.result import draw
 from brakecli.plots.style import applied
+from tests.campaign import campaign
 from tests.plots.helpers import (
     ANGLE,
     CRITICAL,
@@ -48,6 +49,7 @@ def test_maps_hold_the_values_of_their_cells(tmp_path: Path) -> None:
     )
 
 
+@campaign
 def test_a_short_third_axis_stands_side_by_side(tmp_path: Path) -> None:
     for critical in ({}, {"critical": CRITICAL}):
         figure = drawn(write(tmp_path / "r.h5", {"axis": [SPEED, SCHEME, ANGLE], **critical}))

@@ -201,6 +201,7 @@ def test_numbers_at_ticks_stand_apart(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("width", "count"), [(0.1, 5), (1e-4, 9), (1.0, 9)])
+@campaign
 def test_ticks_tell_apart_values_that_differ_little_about_a_large_one(
     width: float, count: int, tmp_path: Path
 ) -> None:

@@ -53,6 +53,7 @@ def test_the_critical_values_of_two_sweeps_are_drawn_along_their_axis(tmp_path: 
     assert axes.get_xlabel() == "link2.angle_deg (deg)"
 
 
+@campaign
 def test_without_critical_values_amplitude_and_frequency_are_drawn_or_what_is_named(tmp_path: Path) -> None:
     names = [write(tmp_path / f"{n}.h5", {"axis": [SPEED]}) for n in (0, 1)]
     assert [axes.get_ylabel() for axes in picture(names).axes] == ["amplitude (µm)", "frequency (Hz)"]
@@ -60,6 +61,7 @@ def test_without_critical_values_amplitude_and_frequency_are_drawn_or_what_is_na
     assert axes.get_ylabel() == "steps"
 
 
+@campaign
 def test_results_over_several_axes_or_over_different_ones_have_no_curves(tmp_path: Path) -> None:
     tables = ({"axis": [ANGLE]}, {"axis": [SPEED]}, {"axis": [ANGLE, SPEED]})
     one, other, several = (write(tmp_path / f"{n}.h5", table) for n, table in enumerate(tables))

@@ -109,6 +109,7 @@ def test_a_rough_pad_lifts_off_and_touches_on_its_motion(tmp_path: Path) -> None
     assert flights.sum() == pytest.approx(touching, abs=0.1 * touching)  # a flight between two samples
 
 
+@campaign
 def test_only_the_last_events_are_kept_and_that_is_said(tmp_path: Path) -> None:
     """Two turning points of x for each two turns of the sliding, beside a wheel that hardly moves it."""
     case = {**RUBS, "friction": {"coefficient": 1e-6}, "wheel": {"radius": 1.0, "angular_speed": 1e-3}}

@@ -74,6 +74,7 @@ def test_without_the_angle_of_the_wheel_the_waves_begin_anew(tmp_path: Path) -> 
     assert apart(ROUGH, tmp_path, "initial={{x={x}, y={y}, vx={vx}, vy={vy}}}") > 0.05
 
 
+@campaign
 def test_the_angle_is_that_of_all_runs_before_whatever_the_speed(tmp_path: Path) -> None:
     """ω falls from 4 to 0.4 rad/s in 10 ms: 22 mrad, then 4 mrad; and the schedule begins anew with each run."""
     wheel = "wheel={radius=0.5, times=[0.0, 0.01], angular_speeds=[4.0, 0.4]}"

@@ -167,6 +167,7 @@ def test_a_verdict_says_whether_a_longer_run_may_say_more(
     assert replace(BLANK, decision=decision, settled=settled_, **others).unfinished is unfinished
 
 
+@campaign
 def test_the_result_repeats_with_its_duration_as_a_number_to_the_last_bit(tmp_path: Path) -> None:
     (tmp_path / "open.toml").write_text(OPEN)
     done = brakecli("run", "open.toml", "--json", cwd=tmp_path)

@@ -190,6 +190,7 @@ def test_default_nodes_resolve_the_shortest_wave(waves: tuple[float, ...], nodes
 
 
 @given(gaps(least=1), st.sampled_from(EVALUATORS), st.floats(1e-4, 0.3))
+@campaign
 def test_stiffness_is_the_force_s_derivative(gap: Gap, evaluator: str, part: float) -> None:
     """F_y is convex in y, so that a difference quotient lies between the stiffnesses at its two ends."""
     eta, pad = part * gap.crest, gap.pad()
@@ -467,6 +468,7 @@ def test_exact_ends_where_profiles_of_almost_equal_length_meet() -> None:
     Gap((), (Wave(2.0**-15, 0.06640625, 3.694680824522566e-304),), 0.03125, 0.0, 0.0, k=1.0), "closed-form", 1, 0
 )
 @given(gaps(), st.sampled_from(EVALUATORS), st.integers(-20, 20), st.integers(-20, 30))
+@campaign
 def test_heights_and_stiffness_scale_exactly(gap: Gap, evaluator: str, height: int, stiffness: int) -> None:
     """Amplitudes and y times 2^p, k times 2^q: no threshold in metres or newtons, so not a bit changes but the
     exponent. A number below the smallest normal one has lost bits: its rounding, 5e-324, times 2^70 at most.

@@ -10,6 +10,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from brakecli.solver.friction import minimise, slopes
+from tests.campaign import campaign
 
 mpmath: Any = import_module("mpmath")  # imported so because it has no type hints
 EPS = 2.0**-52
@@ -131,6 +132,7 @@ def test_without_friction_a_shoe_in_step_with_the_wheel_counts_as_stuck(belt: fl
 
 
 @given(problems(), st.floats(0, 5))
+@campaign
 def test_the_slopes_are_the_derivatives_by_the_normal_force(problem: Problem, phi: float) -> None:
     """d and e are linear in F on a branch, so that any two points on it give the slope."""
     a_11, a_12, a_22, g_1, g_2, force, belt = problem

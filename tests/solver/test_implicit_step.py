@@ -17,7 +17,7 @@ from brakecli.solver.method import MOST_EVALUATIONS
 from brakecli.solver.motion import Stepping
 from brakecli.solver.records import CONTACT, PROBLEM, new
 from brakecli.solver.roughness import Surface, surface
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import ROUGH, make
 
 EPS = 2.0**-52
@@ -209,7 +209,9 @@ def test_newton_takes_few_evaluations_from_a_force_nearby(off: float, mean: floa
     assert np.percentile(taken, 99) <= most  # measured 4 and 10
 
 
-@pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "auto"])
+@pytest.mark.parametrize(
+    "evaluator", ["midpoint", *(pytest.param(e, marks=campaign) for e in ("closed-form", "auto"))]
+)
 def test_a_force_that_is_taken_without_evaluating_it_solves_the_step(evaluator: str) -> None:
     """Places of the gap that begin or cease to touch, sides that change and wheels that are steep forbid it."""
     rng, taken, evaluated = np.random.default_rng(40), 0, 0

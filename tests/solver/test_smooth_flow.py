@@ -120,6 +120,7 @@ def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
         np.testing.assert_allclose(flow.state / scales, end / scales, rtol=0.0, atol=1e-9 * largest)
 
 
+@campaign
 def test_a_flow_composes_of_its_parts_and_so_does_its_derivative() -> None:
     chance = np.random.default_rng(27)
     for _, system in shoes(20):

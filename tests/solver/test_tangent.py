@@ -18,6 +18,7 @@ from brakecli.solver.motion import Motion, Stepping, solve
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
 from tests.analysis.shoes import Tables, random_shoes
+from tests.campaign import campaign
 from tests.examples import MODE_COUPLING, SQUEAL, make
 from tests.sweeps.shoes import drawn as opening
 
@@ -157,6 +158,7 @@ def test_the_disturbance_changes_nothing_of_the_motion() -> None:
         assert beside.exponent is not None
 
 
+@campaign
 def test_a_disturbance_that_vanishes_between_samples_begins_anew() -> None:
     """By dashpots near the critical damping, e^-1000 in a sample interval of 1 s, beyond what a double holds."""
     system = system_of(by_scheme(SQUEAL, "two-layer", initial__at="equilibrium"))

@@ -16,6 +16,7 @@ from brakecli.solver.records import MOST_EVENTS, PARTS, WORK
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, TURN, Track
 from tests.analysis.histories import events_from_samples
 from tests.analysis.shoes import Tables, random_shoes
+from tests.campaign import campaign
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -162,6 +163,7 @@ def test_event_driven_events_are_those_of_exact_steps() -> None:
         assert 0.0 < gaps.max() < 1e-5 * tables["output"]["sample_interval"]
 
 
+@campaign
 def test_a_rough_shoe_leaves_the_wheel_in_event_driven_steps_where_short_steps_say_so() -> None:
     """A difference scheme with the same contact, within half of the long step."""
     exact = {"contact__evaluator": "exact", "contact__nodes": None, "solver__duration": 0.02}

@@ -60,6 +60,7 @@ def basin(folder: Path, factors: list[float]) -> LoadedSweep:
 
 
 @pytest.mark.usefixtures("compiled")
+@campaign
 def test_starts_on_either_side_of_the_unstable_cycle_come_to_two_attractors(tmp_path: Path) -> None:
     """On the line through a state of the unstable cycle, its stable surface is crossed at a factor of 1."""
     factors = [0.2, 0.6, 0.9, 0.97, 1.03, 1.1, 1.3]

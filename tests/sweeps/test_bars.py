@@ -177,6 +177,7 @@ def test_a_narrow_window_lies_where_the_scheme_vibrates_at_half_the_frequency_of
     assert changes_within(tables, key, found.value, found.error, 1.4)
 
 
+@campaign
 def test_a_loss_of_stability_that_only_the_scheme_has_does_not_count() -> None:
     """Its weights damp: without them sliding is unstable from below the range on, as the eigenvalues say."""
     rough, tables, key, lower, upper = answer("passing", 40)

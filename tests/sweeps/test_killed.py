@@ -143,7 +143,7 @@ def test_workers_that_die_idle_cost_no_point(tmp_path: Path) -> None:
     assert len(found) == 4
 
 
-@pytest.mark.parametrize("ours", ["7", None])
+@pytest.mark.parametrize("ours", [pytest.param("7", marks=campaign), None])
 def test_linear_algebra_takes_one_thread_in_a_worker_and_ours_here(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ours: str | None
 ) -> None:
