@@ -9,7 +9,7 @@ from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_sweep, result_path
 from brakecli.front.progress import say, telling
 
-JOBS = "Worker processes  [default: one for each core]"
+JOBS = "Worker processes  [default: one for each core; none for a second of work]"
 SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
 SCHEDULER_FILE = "The same cluster, given by the scheduler's file."
 TASK_SIZE = "Points in each task  [default: as many as take 0.2 s]"
