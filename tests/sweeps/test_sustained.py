@@ -22,7 +22,7 @@ from brakecli.sweeps.windows import Outcome, Search
 from tests.campaign import campaign
 from tests.examples import SQUEAL, make
 from tests.sweeps.test_critical import found
-from tests.sweeps.test_windows import FOLDS
+from tests.sweeps.test_windows import SHOES
 
 KICKED: dict[
     str, Any
@@ -169,7 +169,7 @@ def test_what_lasts_beside_a_motion_that_opens_does_not_fade() -> None:
     """Full contact loses stability at 1.558. Above, runs of ten durations and more of another integrator end in a
     vibration of the shoe's own, also at 1.57, although a motion that opens is stable to 1.89.
     """
-    answer = found(FOLDS["over a gap"], 1.2, 2.4, tolerance=0.02)
+    answer = found(SHOES["over a gap"]["case"], 1.2, 2.4, tolerance=0.02)
     assert answer.outcome is Outcome.FOUND
     assert answer.sustained is None or answer.sustained < 1.65
 

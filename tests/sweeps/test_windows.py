@@ -1,10 +1,11 @@
-"""Windows of instability: resonances of a wheel's wave, found by a search, stored, printed and drawn.
+"""Windows of instability, found by a search, stored, printed and drawn.
 
-The answers come from the equations of motion in full contact and their derivative, integrated over a period of the
-wheel by another program (SciPy's DOP853).
+The ends of those of `windows.toml` are another integrator's. Those of `TONGUES` come from the equations of motion
+in full contact and their derivative, integrated over a period of the wheel by SciPy's DOP853.
 """
 
 import math
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from scipy.integrate import solve_ivp
 
 from brakecli.branches.answers import Answers
 from brakecli.branches.bar import Bound
+from brakecli.branches.explore import Explorer, crossing
 from brakecli.branches.line import Line
 from brakecli.branches.stable_parts import told_apart
 from brakecli.case.system import system_of
@@ -28,8 +30,10 @@ from tests.commands import brakecli
 from tests.examples import make
 from tests.plots.helpers import drawn
 from tests.sweeps.shoes import drawn as opening
-from tests.sweeps.test_critical import found
 
+SHOES: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("windows.toml").read_text(encoding="utf-8")
+)
 TONGUES: dict[str, Any] = {  # a wave of the wheel, whose slope feeds vibration near two speeds
     "shoe": {"mass": 28.0},
     "wheel": {"radius": 0.5, "angular_speed": -18.57},
@@ -107,209 +111,6 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
     np.testing.assert_allclose(segments[:, -1], upper[np.isfinite(upper)])
 
 
-@campaign
-def test_the_third_harmonic_of_a_wave_under_an_opening_pad_is_found() -> None:
-    """Multipliers of another integrator pass -1 at 6.2833 and at 6.3431 rad/s, where 3 waves pass in 2 cycles."""
-    tables: dict[str, Any] = {
-        "shoe": {"mass": 50.12},
-        "wheel": {"radius": 0.33, "angular_speed": 7.828},
-        "link1": {"stiffness": 3039000.0, "damping": 37.17},
-        "link2": {"stiffness": 3442000.0, "damping": 61.76, "angle_deg": 32.63},
-        "load": {"force": 821.5},
-        "friction": {"coefficient": 2.38},
-        "contact": {"half_length": 0.025, "stiffness": 22090000.0},
-        "roughness": {"wheel": {"amplitudes": [0.0001216], "wavelengths": [0.076]}},
-        "output": {"sample_interval": 0.001},
-        "solver": {"duration": 1.2},
-    }
-    answer = found(tables, 6.262, 6.5, "wheel__angular_speed", tolerance=0.003523)
-    assert answer.value is not None
-    assert abs(answer.value - 6.2833) < (answer.error or 0.0)
-    [window] = answer.windows
-    assert abs(window[1] - 6.3431) < (answer.error or 0.0)
-
-
-FOLDS: dict[str, dict[str, Any]] = {
-    "unstable beside": {
-        "shoe": {"mass": 5.598},
-        "wheel": {"radius": 0.33, "angular_speed": 28.3},
-        "link1": {"stiffness": 14970000.0, "damping": 56.26, "angle_deg": 2.715},
-        "link2": {"stiffness": 21640000.0, "damping": 44.6, "angle_deg": 25.79},
-        "load": {"force": 511.5},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.015, "stiffness": 113300000.0},
-        "roughness": {"wheel": {"amplitudes": [8.465e-06, 1.126e-05], "wavelengths": [0.032, 0.016]}},
-        "output": {"sample_interval": 0.00015},
-        "solver": {"duration": 0.2, "tolerance": 0.001},
-    },
-    "resonance": {
-        "shoe": {"mass": 0.7835},
-        "wheel": {"radius": 0.5, "angular_speed": 30.2},
-        "link1": {"stiffness": 6360000.0, "damping": 19.63, "angle_deg": 0.0},
-        "link2": {"stiffness": 6736000.0, "damping": 15.07, "angle_deg": 28.45},
-        "load": {"force": 6333.0},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.04, "stiffness": 52460000.0},
-        "roughness": {"wheel": {"amplitudes": [6.876e-05], "wavelengths": [0.032], "phases_deg": [77.67]}},
-        "output": {"sample_interval": 8.6e-05},
-        "solver": {"duration": 0.2},
-    },
-    "both sides": {
-        "shoe": {"mass": 3.727},
-        "wheel": {"radius": 0.33, "angular_speed": -27.73},
-        "link1": {"stiffness": 6024000.0, "damping": 15.52, "angle_deg": 0.0},
-        "link2": {"stiffness": 12400000.0, "damping": 23.47, "angle_deg": -4.105},
-        "load": {"force": 503.1},
-        "friction": {"coefficient": 1.555},
-        "contact": {"half_length": 0.01, "stiffness": 149500000.0},
-        "roughness": {"wheel": {"amplitudes": [2.244e-05], "wavelengths": [0.032]}},
-        "solver": {"duration": 0.21, "scheme": "two-layer", "step": 3.5e-05, "theta": [0.55, 0.5]},
-    },
-    "doubling": {
-        "shoe": {"mass": 1.179},
-        "wheel": {"radius": 0.5, "angular_speed": 17.66},
-        "link1": {"stiffness": 926400.0, "damping": 7.885, "angle_deg": -10.35},
-        "link2": {"stiffness": 3188000.0, "damping": 4.907, "angle_deg": 17.61},
-        "load": {"force": 155.3},
-        "friction": {"coefficient": 0.9488},
-        "contact": {"half_length": 0.01, "stiffness": 70610000.0},
-        "roughness": {"wheel": {"amplitudes": [5.552e-06, 4.644e-06], "wavelengths": [0.062, 0.034]}},
-        "output": {"sample_interval": 0.00019},
-        "solver": {"duration": 0.22, "scheme": "event-driven"},
-    },
-    "over a gap": {
-        "shoe": {"mass": 5.344},
-        "wheel": {"radius": 0.33, "angular_speed": 49.96},
-        "link1": {"stiffness": 18350000.0, "damping": 18.92, "angle_deg": 0.0},
-        "link2": {"stiffness": 31340000.0, "damping": 35.76, "angle_deg": 15.4},
-        "load": {"force": 916.7},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.055, "stiffness": 46810000.0},
-        "roughness": {
-            "wheel": {"amplitudes": [1.826e-05], "wavelengths": [0.043]},
-            "shoe": {"amplitudes": [3.639e-06], "wavelengths": [0.024]},
-        },
-        "solver": {"duration": 0.2, "scheme": "three-layer", "step": 4.3e-05, "theta": [0.35, 0.3, 0.35]},
-    },
-    "never": {
-        "shoe": {"mass": 2.991},
-        "wheel": {"radius": 0.2, "angular_speed": 49.0},
-        "link1": {"stiffness": 4444000.0, "damping": 9.575, "angle_deg": 0.0},
-        "link2": {"stiffness": 8549000.0, "damping": 15.32, "angle_deg": 11.14},
-        "load": {"force": 172.1},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.04, "stiffness": 20920000.0},
-        "roughness": {"wheel": {"amplitudes": [1.837e-05], "wavelengths": [0.041]}},
-        "solver": {"duration": 0.23, "scheme": "three-layer", "step": 1.9e-05, "theta": [0.25, 0.5, 0.25]},
-    },
-    "stable for a while": {
-        "shoe": {"mass": 17.462},
-        "wheel": {"radius": 0.39593, "angular_speed": 3.3306},
-        "link1": {"stiffness": 4889800.0, "damping": 166.02, "angle_deg": -10.744},
-        "link2": {"stiffness": 10687000.0, "damping": 196.64, "angle_deg": 19.845},
-        "load": {"force": 75.747},
-        "friction": {"coefficient": 0.39},
-        "contact": {"half_length": 0.029609, "stiffness": 119700000.0},
-        "roughness": {
-            "wheel": {
-                "amplitudes": [1.77e-06, 7.14e-06, 2.57e-06],
-                "wavelengths": [0.02255, 0.0056375, 0.005011111111111111],
-            },
-            "shoe": {"amplitudes": [4.79e-06, 4.2e-06], "wavelengths": [0.03357, 0.03749]},
-        },
-        "solver": {"duration": 0.065, "step": 2.7e-05},
-    },
-    "weights that damp": {
-        "shoe": {"mass": 15.76},
-        "wheel": {"radius": 0.5, "angular_speed": -16.26},
-        "link1": {"stiffness": 2333000.0, "damping": 18.9, "angle_deg": -6.37},
-        "link2": {"stiffness": 4897000.0, "damping": 37.4, "angle_deg": -6.827},
-        "load": {"force": 340.7},
-        "friction": {"coefficient": 1.603},
-        "contact": {"half_length": 0.01, "stiffness": 59600000.0},
-        "roughness": {
-            "wheel": {"amplitudes": [8.238e-05], "wavelengths": [0.064], "phases_deg": [208.3]},
-            "shoe": {"amplitudes": [9.225e-06, 2.525e-05], "wavelengths": [0.01, 0.037]},
-        },
-        "solver": {"duration": 0.69, "scheme": "two-layer", "step": 0.00011, "theta": [0.55, 0.5]},
-    },
-    "beside": {
-        "shoe": {"mass": 22.35},
-        "wheel": {"radius": 0.33, "angular_speed": -9.931},
-        "link1": {"stiffness": 8091000.0, "damping": 78.07, "angle_deg": -1.199},
-        "link2": {"stiffness": 36830000.0, "damping": 120.5, "angle_deg": -18.08},
-        "load": {"force": 241.5},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.015, "stiffness": 531400000.0},
-        "roughness": {
-            "wheel": {"amplitudes": [4.244e-06, 6.172e-06], "wavelengths": [0.051, 0.008]},
-            "shoe": {"amplitudes": [1.872e-06], "wavelengths": [0.037]},
-        },
-        "solver": {"duration": 0.3, "scheme": "two-layer", "step": 5e-05, "theta": [0.6, 0.5]},
-    },
-    "narrow": {
-        "shoe": {"mass": 16.26},
-        "wheel": {"radius": 0.33, "angular_speed": -13.6},
-        "link1": {"stiffness": 1959000.0, "damping": 0.0, "angle_deg": 0.0},
-        "link2": {"stiffness": 2230000.0, "damping": 0.0, "angle_deg": -4.532},
-        "load": {"force": 340.4},
-        "friction": {"coefficient": 0.7902},
-        "contact": {"half_length": 0.015, "stiffness": 21630000.0},
-        "roughness": {
-            "wheel": {
-                "amplitudes": [5.649e-05, 3.036e-05],
-                "wavelengths": [0.021, 0.044],
-                "phases_deg": [198.5, 277.9],
-            },
-            "shoe": {"amplitudes": [1.926e-05], "wavelengths": [0.013]},
-        },
-        "solver": {"duration": 0.97, "scheme": "two-layer", "step": 8.1e-05, "theta": [0.52, 0.5]},
-    },
-    "ends": {
-        "shoe": {"mass": 34.24},
-        "wheel": {"radius": 0.5, "angular_speed": 1.394},
-        "link1": {"stiffness": 597800.0, "damping": 0.0, "angle_deg": 0.0},
-        "link2": {"stiffness": 2143000.0, "damping": 0.0, "angle_deg": 3.496},
-        "load": {"force": 121.9},
-        "friction": {"coefficient": 0.1},
-        "contact": {"half_length": 0.025, "stiffness": 15220000.0},
-        "roughness": {"wheel": {"amplitudes": [2.047e-05, 1.901e-05], "wavelengths": [0.018, 0.017]}},
-        "output": {"sample_interval": 0.0013},
-        "solver": {"duration": 1.5, "scheme": "event-driven"},
-    },
-    "strong dashpot": {  # its scheme takes 0.2 1/s less from a mode than dashpots do, as much as sliding loses
-        "shoe": {"mass": 23.132},
-        "wheel": {"radius": 0.39521, "angular_speed": -2.138},
-        "link1": {"stiffness": 15085000.0, "damping": 6247.9, "angle_deg": 4.3122},
-        "link2": {"stiffness": 50936000.0, "damping": 1053.3, "angle_deg": -51.048},
-        "load": {"force": 4024.0},
-        "friction": {"coefficient": 0.6174},
-        "contact": {"half_length": 0.03041, "stiffness": 1426500000.0},
-        "roughness": {
-            "shoe": {"amplitudes": [2.18e-06, 3.72e-06, 1.35e-06], "wavelengths": [0.01802, 0.0452, 0.00988]},
-            "wheel": {
-                "amplitudes": [3.5e-05, 1.57e-05],
-                "wavelengths": [0.171 / 11, 0.171 / 29],
-            },
-        },
-        "output": {"sample_interval": 7.8e-05},
-        "solver": {"step": 3.9e-05, "duration": 0.067},
-    },
-    "stable again": {
-        "shoe": {"mass": 1.973},
-        "wheel": {"radius": 0.5, "angular_speed": -8.699},
-        "link1": {"stiffness": 364800.0, "damping": 1.37, "angle_deg": -13.11},
-        "link2": {"stiffness": 1642000.0, "damping": 2.295, "angle_deg": -34.82},
-        "load": {"force": 253.7},
-        "friction": {"coefficient": 1.211},
-        "contact": {"half_length": 0.01, "stiffness": 45170000.0},
-        "roughness": {"wheel": {"amplitudes": [0.0001918], "wavelengths": [0.06], "phases_deg": [302.3]}},
-        "output": {"sample_interval": 0.00033},
-        "solver": {"duration": 0.39, "tolerance": 0.0001},
-    },
-}
-
-
 def listed_ends(tables: dict[str, Any], key: str, range_: tuple[float, float]) -> tuple[Search, list[float]]:
     """The windows that a search finds, and all special points of the branches that it follows."""
     lower, upper = range_
@@ -331,108 +132,26 @@ def assert_found(truth: list[float], answer: Search, listed: list[float], range_
         assert any(abs(value - true) <= bar for value, bar in ends), true
 
 
-def followed(name: str, key: str, ends: tuple[float, float]) -> Search:
-    """What a search finds, without its runs for the least sustained value."""
-    lower, upper = ends
-    critical = Critical(
-        parameter=key.replace("__", "."), lower=lower, upper=upper, tolerance=1e-3 * (upper - lower)
-    )
-    return search(critical, Line(make(FOLDS[name]), [critical.parameter], lower, upper))
-
-
 @pytest.mark.parametrize(
-    ("name", "key", "ends", "truth", "least"),
-    [
-        # at 4.95 another integrator finds it stable still, with a largest multiplier of exp(-4.06 1/s)
-        ("unstable beside", "friction__coefficient", (0.0, 7.5), 4.954, 2.7),
-        pytest.param("resonance", "friction__coefficient", (0.0, 2.5), 2.326, 1.6, marks=campaign),
-        pytest.param("over a gap", "friction__coefficient", (0.0, 2.4), 1.8876, 1.7, marks=campaign),
-        pytest.param("both sides", "shoe__mass", (1.491, 9.317), 3.69096, 3.6, marks=campaign),
-    ],
+    "name", [pytest.param(name, marks=() if "quick" in shoe else campaign) for name, shoe in SHOES.items()]
 )
-@campaign
-def test_a_stable_motion_is_followed_until_it_ends(
-    name: str, key: str, ends: tuple[float, float], truth: float, least: float
-) -> None:
-    """Another integrator, of fourth order, follows it in small steps to the `truth`. At the `least` value, where
-    another motion is unstable, it is stable.
-    """
-    answer = followed(name, key, ends)
-    assert answer.value is not None
-    assert answer.error is not None
-    assert abs(answer.value - truth) < answer.error
-    assert least < answer.value
-    assert answer.error < 0.04 * (ends[1] - ends[0])
-    lost = answer.outcome is Outcome.FOUND
-    assert answer.windows[-1] == ((answer.value, ends[1]) if lost else (ends[0], answer.value))
-
-
-@pytest.mark.parametrize("ends", [(0.0, 2.5), (1.0, 1.6)])
-def test_a_motion_that_full_contact_would_have_does_not_count_where_it_would_open(
-    ends: tuple[float, float],
-) -> None:
-    """By the equations of full contact sliding is unstable from 1.231 on. The wave opens the pad from 1.03 on, and
-    another integrator follows the motion that opens, always stable, to 2.5.
-    """
-    answer = followed("never", "friction__coefficient", ends)
-    assert answer.outcome is Outcome.STABLE
-    assert answer.windows == ()
-
-
-@campaign
-@pytest.mark.parametrize(
-    ("name", "key", "range_", "truth", "most"),
-    [  # its weights take away 0.5 1/s, more than the growth; at 17.157 kg that jumps by 0.003 1/s, as where
-        # a motion ends: the bar is a 32nd of the range, 1.034 kg, and half the bracket
-        (
-            "weights that damp",
-            "shoe__mass",
-            (6.304, 39.4),
-            [8.82, 17.35, 28.02, 29.85, 39.4],
-            [0.6, 1.06, 0.6, 0.6, 0.6],
-        ),
-        ("beside", "friction__coefficient", (0.0, 1.1), [0.67342, 0.68719, 0.74487, 1.1], 0.005),
-        ("stable again", "link2__stiffness", (8.21e5, 2.791e6), [1.7233e6, 1.8384e6, 1.90733e6], 7e4),
-        (  # the last end is a fold; on both sides another motion is followed that is unstable
-            "stable for a while",
-            "friction__coefficient",
-            (0.0, 1.5),
-            [0.8768877, 0.9665873, 0.9702961, 1.5],
-            [0.003, 0.003, 0.05, 0.003],
-        ),
-        (  # the seventh end is a fold
-            "strong dashpot",
-            "load__force",
-            (2776.0, 11900.0),
-            [3392.982, 3429.524, 3553.108, 4458.478, 4687.264, 6454.39, 6473.367, 6935.641],
-            [50.0, 50.0, 50.0, 50.0, 50.0, 50.0, 300.0, 50.0],
-        ),
-        (  # ends soon after it has doubled its period; the motion that the shoe falls onto is unstable once more
-            "doubling",
-            "link2__stiffness",
-            (1.594e6, 5.42e6),
-            [3.463285e6, 3.83164e6, 3.83538e6],
-            2e6,
-        ),
-    ],
-)
-def test_no_window_of_a_motion_that_is_followed_is_hidden(
-    name: str, key: str, range_: tuple[float, float], truth: list[float], most: float | list[float]
-) -> None:
-    """Another integrator follows it and finds where multipliers pass one."""
-    answer, listed = listed_ends(FOLDS[name], key, range_)
-    assert_found(truth, answer, listed, range_)
-    errors = [error for pair in answer.window_errors for error in pair]
-    assert max(errors) < max(most) if isinstance(most, list) else max(errors) < most
-
-
-@campaign
-def test_the_bar_of_a_narrow_window_does_not_reach_for_the_next_one() -> None:
-    """Another integrator finds it from 898.018 to 898.873 kN/m, a 4800th of the range wide."""
-    answer = followed("narrow", "link1__stiffness", (7.836e5, 4.898e6))
-    ends, errors = np.array(answer.windows[0]), np.array(answer.window_errors[0])
-    assert (np.abs(ends - [898018.0, 898873.0]) <= errors).all()
-    assert (errors < 5e3).all()
+def test_the_windows_of_a_shoe_are_those_of_another_integrator(name: str) -> None:
+    shoe = SHOES[name]
+    answer, listed = listed_ends(shoe["case"], shoe["key"].replace(".", "__"), shoe["range"])
+    assert_found(shoe["ends"], answer, listed, shoe["range"])
+    assert shoe["ends"] or answer.windows == ()
+    assert answer.outcome.value in shoe.get("outcomes", ["found", "found, stable above"])
+    assert all(error < shoe.get("most", math.inf) for pair in answer.window_errors for error in pair)
+    if answer.value is None or answer.error is None:
+        assert not {"critical", "stable_at", "error"} & set(shoe)
+        return
+    assert abs(answer.value - shoe.get("critical", answer.value)) <= answer.error
+    assert answer.error < shoe.get("error", math.inf)
+    if "stable_at" in shoe:
+        lower, upper = shoe["range"]
+        assert shoe["stable_at"] < answer.value
+        lost = answer.outcome is Outcome.FOUND
+        assert answer.windows[-1] == ((answer.value, upper) if lost else (lower, answer.value))
 
 
 def test_a_window_or_gap_narrower_than_its_bars_of_which_one_is_wide_is_none() -> None:
@@ -475,3 +194,39 @@ def test_a_branch_that_others_go_on_with_is_not_lost() -> None:
     assert answer.outcome is Outcome.FOUND
     assert len(answer.windows) == 1
     assert answers.sentence.startswith("squeals by itself from 4.463e+06 to 7.958e+06;")
+
+
+@campaign
+def test_a_value_is_stable_where_one_sheet_of_the_branch_is_and_all_ends_are_listed() -> None:
+    """By another integrator the small motion is unstable from 1.71369 to 1.74247, and it ends at 1.76694. One of
+    twice its amplitude is stable there. At 1.73 the largest multipliers are 0.99452 for it and 1.00356.
+    """
+    line = Line(make(SHOES["two sheets"]["case"]), ["friction.coefficient"], 0.0, 7.1)
+    found = Answers(Explorer(line, lambda *_: None, lambda: False).explore(), None)
+    assert found.critical == pytest.approx(1.76694, abs=2e-4)
+    [base] = found.bases
+    listed = {mark.kind: mark.value for mark in base.special[:4]}
+    assert base.special[1].value == pytest.approx(1.71369, abs=2e-4)
+    assert base.special[2].value == pytest.approx(1.74247, abs=2e-4)
+    assert {"torus", "fold"} <= set(listed)
+    largest = sorted(float(np.abs(each.multipliers).max()) for each in crossing(base, line.place(1.73)))
+    assert largest[:2] == pytest.approx([0.99452, 1.00356], abs=1e-4)
+
+
+@campaign
+def test_where_no_motion_was_found_a_window_ends_anywhere_and_a_note_says_so(
+    tmp_path: Path, without_runs: None
+) -> None:
+    """Growth of up to 557 1/s lasts to the end of the range."""
+    shoe = SHOES["lost"]
+    (tmp_path / "case.toml").write_text(tomli_w.dumps(shoe["case"]))
+    (lower, upper), key = shoe["range"], shoe["key"]
+    table = {"parameter": key, "lower": lower, "upper": upper, "tolerance": 1e-3}
+    (tmp_path / "s.toml").write_text(tomli_w.dumps({"case": "case.toml", "critical": table}))
+    printed = brakecli("sweep", "s.toml", "--json", cwd=tmp_path).json
+    assert any("a window of instability ends anywhere from" in each for each in printed["findings"])
+    found = search(Critical(**table), Line(make(shoe["case"]), [key], lower, upper))
+    [(begin, end)], [(_, error)] = found.windows, found.window_errors
+    assert begin == pytest.approx(shoe["critical"], abs=found.error)
+    assert end == upper
+    assert 1.0 < error < end - begin
