@@ -61,7 +61,7 @@ WORKER_MARGIN = 10_000_000
 """Bytes; a worker knows of one task at a time, and what it needs besides depends on how memory was handed out."""
 
 
-@pytest.mark.parametrize(("points", "compute"), [(100_000, "quick"), (10_000, "compute_units")])
+@pytest.mark.parametrize(("points", "compute"), [(100_000, "quick"), (30_000, "compute_units")])
 @campaign
 def test_many_points_need_no_more_memory_than_a_thousand(tmp_path: Path, points: int, compute: str) -> None:
     few, many = memory_of(tmp_path, 1000, compute), memory_of(tmp_path, points, compute)
