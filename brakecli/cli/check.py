@@ -24,9 +24,9 @@ def command(
         from brakecli.front.tables import estimate_table
         from brakecli.runs.limits import free_bytes
         from brakecli.sweeps.cost import estimate, refuse_sweep
-        from brakecli.sweeps.driver import cores
+        from brakecli.sweeps.driver import crew
 
-        cost = estimate(sweep.plan, min(cores(), sweep.plan.units), spare=True)
+        cost = estimate(sweep.plan, crew(sweep.plan), spare=True)
         numbers = {"valid": True, **vars(cost)}
         show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
         warn(*cost.refused)

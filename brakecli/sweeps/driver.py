@@ -97,18 +97,19 @@ def choose_engine(
     if scheduler is None and scheduler_file is None:
         if in_caller and jobs == 1:
             return CallerEngine(compute)
-        return LocalEngine(compute, min(jobs or cores(), plan.units), spare=jobs is None and not in_caller)
+        return LocalEngine(compute, crew(plan, jobs), spare=jobs is None and not in_caller)
     from brakecli.sweeps.workers.dask import ClusterEngine
 
     return ClusterEngine(compute, scheduler, scheduler_file)
 
 
-def cores() -> int:
-    """The cores that this process may use."""
+def crew(plan: Plan, jobs: int | None = None) -> int:
+    """How many workers compute a sweep here: one for each core that this process may use, or `jobs`."""
     try:
-        return len(os.sched_getaffinity(0))
+        cores = len(os.sched_getaffinity(0))
     except AttributeError:  # not on every system
-        return os.cpu_count() or 1
+        cores = os.cpu_count() or 1
+    return min(jobs or cores, plan.units)
 
 
 def sweep(
