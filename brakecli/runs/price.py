@@ -64,6 +64,7 @@ def _begun(system: System) -> Price:
     """The cost of a case that starts soon."""
     method, duration, guess = system.method, system.sampled_duration, guessed(system)
     length, before = duration * min(1.0, FIRST / max(guess.seconds, FIRST)), _Part(0.0, 0.0)
+    _ran(system, length)  # kernels are loaded first
     while True:
         part = _ran(system, length)
         if part.seconds > ENOUGH:  # kernels may have been loaded

@@ -13,12 +13,13 @@ import numpy as np
 from numba import boolean, float64, int64, types
 from numba.core import cgutils
 from numba.core import event as numba_events
+from numba.core.compiler_lock import global_compiler_lock
 from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from brakecli.solver import compiling
-from brakecli.solver.kernel_cache import compile_for, config, not_compiled
+from brakecli.solver.kernel_cache import compile_for, config, is_cached, not_compiled
 
 Floats = NDArray[np.float64]
 vector = float64[::1]
@@ -57,28 +58,37 @@ class _Compiling(events.Listener):  # type: ignore[misc]
 events.register("numba:compile", _Compiling())
 
 
-class _ForKernels(CPUDispatcher):
-    """A kernel for other kernels alone: a run whose kernels are all in the cache never loads it.
+class _Waiting(CPUDispatcher):
+    """A kernel that is loaded when it is first called: a run needs a third of those that it imports.
 
-    It has no wrapper for calls from Python, which would otherwise end the process.
+    One for other kernels alone has no wrapper for calls from Python, which would otherwise end the process.
     """
 
     signature: Any
-    _can_compile: bool
+    private: bool
 
-    def __call__(self, *arguments: Any) -> None:
-        name = vars(self)["__name__"]
-        raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
+    def __call__(self, *arguments: Any) -> Any:
+        if self.private:
+            name = vars(self)["__name__"]
+            raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
+        self.ready()
+        self.__class__ = CPUDispatcher  # type: ignore[assignment]  # whose calls take no way through Python
+        return self(*arguments)
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What the compiler asks for where another kernel calls this one."""
-        if self._can_compile:
-            compile_for(self, self.signature)
+        self.ready()
         return super().get_call_template(args, kws)
+
+    def ready(self) -> None:
+        """Load the machine code, or compile it, in one thread alone."""
+        with global_compiler_lock:
+            if not self.overloads:
+                compile_for(self, self.signature)
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
-    """Compile a function ahead of its first call for one signature, strictly (no fastmath unless named).
+    """Compile a function for one signature, strictly (no fastmath unless named), ahead of its first call.
 
     A large one that is called in many places is better not `inlined`: otherwise compilation takes ten times
     longer. Such a one, and one whose name begins with an underscore, is for other kernels alone: it has no wrapper
@@ -90,10 +100,10 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         options: dict[str, Any] = {"fastmath": set(fastmath), "forceinline": inlined, "no_cfunc_wrapper": True}
         options["no_cpython_wrapper"] = private
         compiled: Any = not_compiled(function, options)
-        if private and not config.DISABLE_JIT:
-            compiled.__class__, compiled.signature = _ForKernels, signature
-        elif not config.DISABLE_JIT:
-            compile_for(compiled, signature)
+        if not config.DISABLE_JIT:
+            compiled.__class__, compiled.signature, compiled.private = _Waiting, signature, private
+            if not private and not is_cached(compiled, signature):  # before anything is timed
+                compiled.ready()
         return compiled  # type: ignore[no-any-return]
 
     return compile_
@@ -110,7 +120,7 @@ def address(function: Any) -> int:
             _functions.append(function)
         return _functions.index(function)
     if not function.overloads:  # no kernel that has been compiled here calls it by its name
-        compile_for(function, function.signature)
+        function.ready()
     (compiled,) = function.overloads.values()
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 

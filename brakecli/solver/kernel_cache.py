@@ -148,6 +148,14 @@ class _Whole(codegen.JITCodeLibrary):  # type: ignore[misc]
         super()._optimize_final_module()
 
 
+def is_cached(dispatcher: Any, signature: Any) -> bool:
+    """Whether the cache knows a kernel, and it need not be compiled."""
+    cache = dispatcher._cache
+    if isinstance(cache, caching.NullCache):
+        return False
+    return cache._index_key(signature, dispatcher.targetctx.codegen()) in cache._cache_file._load_index()
+
+
 def compile_for(dispatcher: Any, signature: Any) -> None:
     """Compile a kernel for one signature, or load it from the cache."""
     before, maker = len(_held), dispatcher.targetctx.codegen()
