@@ -61,7 +61,7 @@ def test_every_name_of_a_comparison_is_documented(tmp_path: Path) -> None:
     page = "".join((ROOT / "docs" / page).read_text() for page in ("accuracy.md", "result-format.md"))
     loaded = parse_case(starters()["case"], "starter", ["solver.duration=0.01"])
     found = compare(system_of(loaded.case), schemes=["event-driven"], budget=1.0)
-    report = ComparisonReport(tmp_path / "r.h5", loaded.case.title, found, 1e-3)
+    report = ComparisonReport(tmp_path / "r.h5", loaded.case, found, 1e-3)
     write(report.output, loaded, report, force=False)
     numbers = report.numbers()
     with open_result(report.output, kind="comparison") as stored:

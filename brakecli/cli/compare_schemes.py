@@ -42,7 +42,7 @@ def command(
         with new_output(target, force=force):  # whether it can be written is known before anything is computed
             pass
         found = compare(system, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)
-        report = ComparisonReport(target, loaded.case.title, found, target_error)
+        report = ComparisonReport(target, loaded.case, found, target_error)
         write(target, loaded, report, force=force)
     numbers = {"output": str(target), **report.numbers()}
     show_result("compare-schemes", numbers, comparison_table, report, as_json=as_json, quiet=quiet)

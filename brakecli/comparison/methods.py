@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 from brakecli.case.tables import LARGEST, SMALLEST
 from brakecli.errors import UsageError
@@ -27,6 +28,25 @@ def method_label(kind: Method) -> str:
         {"midpoint": f"{kind.nodes} nodes", "exact": "exact contact"}.get(kind.evaluator, ""),
     ]
     return ", ".join(filter(None, words))
+
+
+def in_a_case(method: Method, error: float, interval: float) -> dict[str, Any]:
+    """Keys of a case, and their values, that ask for a method; keys that a default serves are left out.
+
+    `interval`: between the samples of the case, s, which become fewer where the step is longer.
+    Where steps are the method's own, a case states the error, and its run chooses steps and nodes by itself.
+    """
+    if method.own_steps:
+        return {"solver.tolerance": error}
+    usual = Method(method.scheme, method.row.theta, evaluator="auto")
+    keys: dict[str, Any] = {"solver.scheme": method.scheme, "solver.step": method.step}
+    if method.step is not None and method.step > interval:
+        keys["output.sample_interval"] = method.step
+    for key in ("solver.theta", "solver.start", "solver.iteration", "contact.evaluator", "contact.nodes"):
+        name = key.split(".")[1]
+        if (value := getattr(method, name)) != getattr(usual, name) and value != "closed-form":
+            keys[key] = value
+    return keys
 
 
 def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:

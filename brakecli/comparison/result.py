@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase
 from brakecli.comparison.compare import Comparison, Entry
+from brakecli.comparison.methods import in_a_case
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.files.write import new_result
@@ -20,9 +22,14 @@ class ComparisonReport:
     """A comparison with the error that is aimed at."""
 
     output: Path
-    title: str
+    case: Case
     comparison: Comparison
     target: float
+
+    @property
+    def title(self) -> str:
+        """Title of the case."""
+        return self.case.title
 
     @property
     def recommended(self) -> Entry | None:
@@ -36,6 +43,13 @@ class ComparisonReport:
         """The target over the error of the recommended entry."""
         best = self.recommended
         return None if best is None else self.target / best.error
+
+    @property
+    def in_a_case(self) -> dict[str, Any]:
+        """Keys of a case, and their values, that ask for the recommended method."""
+        if (best := self.recommended) is None:
+            return {}
+        return in_a_case(best.method, self.target, self.case.output.sample_interval)
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""

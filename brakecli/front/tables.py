@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -268,18 +269,20 @@ def comparison_table(report: ComparisonReport) -> str:
     failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
     recommended = [f"none meets {report.target:g}"]
     if best is not None:
-        recommended = [f"{best}: error {best.error:.2g}, {report.margin:.3g} times below {report.target:g}"]
+        recommended = [f"{best}: error {best.error:.2g}, and {report.target:g} is the target"]
         if (finer := found.finer_error(best)) > report.target:
             chance = f"this is by chance: at a finer step its error is {finer:.2g}"
             recommended.append(f"{chance}; choose a method with more margin")
+    times = f"median of {found.repeats} repetitions," if found.repeats > 1 else "measured once,"
     left_out = f"{found.left_out} entries, because the time was used up; give a larger --budget"
     rows = [
         ("compared over", f"{found.duration:.6g} s of motion"),
         ("reference", f"event-driven, error below {found.reference_error:.1e}, {found.reference_seconds:.3g} s"),
-        ("times", f"median of {found.repeats} repetitions, of the time loop alone"),
+        ("times", f"{times} of the time loop alone"),
         ("left out", [left_out] if found.left_out else []),
         ("failed", [f"{len(failed)} entries, such as {each}: {each.failure}" for each in failed[:1]]),
         ("recommended", recommended),
+        ("in a case", ", ".join(f"{key} = {json.dumps(each)}" for key, each in report.in_a_case.items()) or []),
         ("file", str(report.output)),
     ]
     best_entries = "No other is better in both error and time:\n" + _entries(front)

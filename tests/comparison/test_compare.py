@@ -1,5 +1,6 @@
 """Comparisons of methods: what is measured is what it says, and it agrees with what is known otherwise."""
 
+import json
 import math
 from dataclasses import replace
 from functools import cache
@@ -8,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+import tomli_w
 import xarray
 from numpy.typing import NDArray
 
@@ -21,6 +23,7 @@ from brakecli.comparison.methods import (
     NODE_FACTORS,
     RUNGS,
     TOLERANCES,
+    in_a_case,
     kinds,
     ladder,
     method_label,
@@ -299,7 +302,7 @@ def beats(one: Entry, other: Entry) -> bool:
 @pytest.mark.parametrize("target", [1e-1, 1e-3, 1e-6])
 def test_recommended_is_the_cheapest_that_meets_the_target(target: float) -> None:
     found = smooth_comparison()
-    best = ComparisonReport(Path("x.h5"), "t", found, target).recommended
+    best = ComparisonReport(Path("x.h5"), smooth(), found, target).recommended
     assert best is not None
     assert best.errors is not None
     assert best.errors.error <= target
@@ -319,11 +322,26 @@ def test_an_error_that_is_low_by_chance_is_told() -> None:
     lucky = replace(coarsest, errors=replace(coarsest.errors, error=target / 2.0))
     for entries, told in (((lucky, *finer), True), ((lucky,), False)):
         chosen = replace(found, entries=entries, reference_error=0.0)
-        assert ("by chance" in comparison_table(ComparisonReport(Path("x.h5"), "t", chosen, target))) == told
+        assert ("by chance" in comparison_table(ComparisonReport(Path("x.h5"), smooth(), chosen, target))) == told
+
+
+@pytest.mark.parametrize("base", [SQUEAL, ROUGH], ids=["smooth", "rough"])
+def test_the_keys_of_a_method_make_a_case_that_is_solved_by_it(base: dict[str, Any]) -> None:
+    text, system = tomli_w.dumps(base), system_of(make(base))
+    for kind in kinds(system):
+        method = rungs(kind, ladder(system))[0]
+        keys = [f"{key}={json.dumps(value)}" for key, value in in_a_case(method, 1e-4, system.interval).items()]
+        made = system_of(parse_case(text, "case", keys).case).method
+        if method.own_steps:  # a case asks for an error, and its run finds the method
+            assert (made.tolerance, made.automatic, made.step) == (1e-4, True, None)
+        else:
+            asked = "auto" if method.evaluator == "closed-form" else method.evaluator
+            nodes = method.nodes or made.nodes  # those of the case where the method needs none
+            assert replace(made, tolerance=0.0) == replace(method, evaluator=asked, nodes=nodes)
 
 
 def test_nothing_is_recommended_where_nothing_meets_the_target() -> None:
-    numbers = ComparisonReport(Path("x.h5"), "t", smooth_comparison(), 1e-15).numbers()
+    numbers = ComparisonReport(Path("x.h5"), smooth(), smooth_comparison(), 1e-15).numbers()
     assert numbers["recommended"] is None
     assert numbers["margin"] is None
 

@@ -194,7 +194,7 @@ def test_a_computed_comparison_is_drawn_with_its_own_numbers(tmp_path: Path) -> 
     found = compare(
         system_of(loaded.case), schemes=["three-layer", "event-driven"], steps=[4e-5, 2e-5], budget=30.0
     )
-    report = ComparisonReport(tmp_path / "r.h5", "Tiny", found, 1e-2)
+    report = ComparisonReport(tmp_path / "r.h5", loaded.case, found, 1e-2)
     comparison_result.write(report.output, loaded, report, force=False)
     figure = drawn(report.output)
     assert figure.texts[0].get_text() == "Tiny"
