@@ -56,7 +56,7 @@ def system_of(case: Case) -> System:
             step=solver.step,
             tolerance=solver.effective_tolerance or EVENT_TOLERANCE,
             allow_unconverged=solver.allow_unconverged,
-            automatic=automatic,
+            automatic=automatic and case.contact.evaluator == "auto",
         ),
         notes=tuple(f"roughness.{side}: {each.note}" for side, each in case.roughness if each and each.note),
     )

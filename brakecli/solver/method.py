@@ -13,8 +13,8 @@ class Method:
     """A scheme with everything that is chosen beside it, as it is asked for; a `System` says what comes of it.
 
     `step` (s): a run shortens it until it divides the sample interval. None: the histories keep `tolerance`.
-    `nodes`: 0 leaves their number open. `automatic`: a tolerance may choose another scheme. `share`: the part that
-    exact steps take of the longest one.
+    `nodes`: 0 leaves their number open. `automatic`: a tolerance may choose scheme and contact. `share`: the part
+    that exact steps take of the longest one.
     """
 
     scheme: str

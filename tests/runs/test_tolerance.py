@@ -294,6 +294,17 @@ def test_a_scheme_that_is_named_is_kept(scheme: str) -> None:
     assert kept(found, case) <= 1e-3
 
 
+@pytest.mark.parametrize("given", [{}, {"solver__scheme": "event-driven"}], ids=["auto", "named"])
+def test_an_evaluator_that_is_named_is_kept(given: dict[str, Any]) -> None:
+    found = {}
+    for evaluator in ("auto", "exact"):
+        case = promised(OPEN, 1e-3, contact__evaluator=evaluator, **given)
+        found[evaluator] = {*certify(system_of(case)).motion.work.evaluators}
+    assert "exact" in found["exact"]
+    assert "midpoint" not in found["exact"]
+    assert ("midpoint" in found["auto"]) == (not given)  # the program takes nodes where it is cheaper
+
+
 def test_runs_whose_steps_are_limited_by_passing_waves_do_not_vouch_for_each_other() -> None:
     """They take the same steps and share their errors: what they differ by may be far less than either is off."""
     wave = {"wheel": {"amplitudes": [2e-6], "wavelengths": [0.004]}}
