@@ -233,7 +233,8 @@ def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
     start = time.perf_counter()
 
     def run(part: System) -> Judged[Motion]:
-        return judged_in_memory(part, lambda done: progress("steps of the check", done, part.steps))
+        what, total = ("samples", part.samples) if part.method.step is None else ("steps", part.steps)
+        return judged_in_memory(part, lambda done: progress(f"{what} of the check", done, total))
 
     ended = settled(asked(system), run)
     spent, duration = time.perf_counter() - start, ended.system.sampled_duration
