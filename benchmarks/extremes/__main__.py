@@ -140,7 +140,8 @@ def together_text() -> str:
         for scheme, outcome in point.items()
         if outcome.kind == "silently wrong"
     ]
-    told = "\n".join(wrong) or "None is silently wrong."
+    heading = "These points are silently wrong, with their changes of the base case:"
+    told = "\n".join((heading, "", *wrong)) if wrong else "None is silently wrong."
     return f"""## Several at a time
 
 {POINTS} points on smooth surfaces are drawn with a fixed seed. At each, three of these quantities are drawn, in SI
@@ -152,8 +153,6 @@ The bound above applies to one quantity at a time. Here a run is right if its er
 with the event-driven scheme, at most its tolerance.
 
 {table(["scheme", *KINDS, "median error of right ones", "largest"], rows)}
-
-These points are silently wrong, with their changes of the base case:
 
 {told}
 """

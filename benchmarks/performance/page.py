@@ -86,7 +86,7 @@ def side_by_side(name: str, duration: float, entries: list[Entry]) -> list[str]:
     for target in (1e-3, 1e-6):
         best = [(who, cheapest(entries, who, target)) for who in names(entries)]
         told = [f"{who} {each.label} (error {each.error:.0e})" for who, each in best if each]
-        lines += [f"- {target:.0e}: " + "; ".join(told) + "."]
+        lines += [f"- {target:.0e}: " + ("; ".join(told) or "none reaches it") + "."]
     return [*lines, ""]
 
 

@@ -56,4 +56,5 @@ def command(
             if target:
                 write(target, loaded, found, units, force=force)
     numbers = {**values_of(BRANCH, found), "output": target and str(target)}
-    show_result("branch", numbers, branch_table, loaded.case.title, found, units, as_json=as_json, quiet=quiet)
+    shown = loaded.case.title, found, units, target
+    show_result("branch", numbers, branch_table, *shown, as_json=as_json, quiet=quiet)

@@ -61,7 +61,7 @@ def command(
         numbers |= values_of(THRESHOLDS, both)
     if found:
         numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
-    shown = loaded.case.title, report, found, both
+    shown = loaded.case.title, report, found, both, target
     show_result("stability", numbers, stability_table, *shown, as_json=as_json, quiet=quiet)
 
 

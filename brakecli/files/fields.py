@@ -6,6 +6,7 @@ that all files have in common, `docs/regimes.md` the evidence, and `docs/stabili
 stability, which have the attributes of their classes. Those rows stand in `stability_fields`.
 """
 
+import re
 from dataclasses import replace
 
 from brakecli.files.field import Field, integer, named, ratio, within
@@ -64,19 +65,20 @@ VERDICT = within(
 )
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
-EVIDENCE_UNITS = dict.fromkeys(("growth", "exponent", "even", "rate_"), "1/s") | {
-    "amplitude_v": "m/s",
-    "level": "m/s",
+_EVIDENCE_UNITS = {
+    "1/s": r"growth.*|exponent.*|even(_.*)?|rate_.*",
+    "m/s": r"amplitude_v.*|level.*",
+    "m": r"amplitude(?!_v).*",
+    "Hz": r"frequency.*|line_freq.*|ringing.*",
+    "W": r"power_.*|friction_error.*|roughness_error.*",
+    "s": r"duration.*|seconds.*|slowest.*|period_.*|to_limit.*",
 }
-EVIDENCE_UNITS |= dict.fromkeys(("frequency", "line_freq", "ringing"), "Hz") | {"amplitude": "m"}
-EVIDENCE_UNITS |= dict.fromkeys(("power_", "friction_error", "roughness_error"), "W")
-EVIDENCE_UNITS |= dict.fromkeys(("duration", "seconds", "slowest", "period_", "to_limit"), "s")
-"""By how the names of the evidence begin; all others are pure numbers."""
+"""Patterns of the names of the evidence; all others are pure numbers."""
 
 
 def evidence_unit(name: str) -> str:
     """The unit of a number of the evidence; empty for a pure number."""
-    return next((unit for start, unit in EVIDENCE_UNITS.items() if name.startswith(start)), "")
+    return next((unit for unit, names in _EVIDENCE_UNITS.items() if re.fullmatch(names, name)), "")
 
 
 ENERGY = (

@@ -10,6 +10,8 @@ from brakecli.front.render import text_of
 from brakecli.front.tables import Row, grid, two_columns
 
 if TYPE_CHECKING:
+    from pathlib import Path
+
     from brakecli.analysis.stability.advice import Change
     from brakecli.analysis.stability.modes import Crossing
     from brakecli.analysis.stability.report import StabilityReport
@@ -20,12 +22,16 @@ if TYPE_CHECKING:
     from brakecli.scattering.scatter import ScatterReport
     from brakecli.sweeps.lock_in import LockIn
 
-_NAMES = {"critical_below": "critical friction below own", "squeal": "squeal"}
+_NAMES = {"critical_below": "critical friction below the brake's own", "squeal": "squeal"}
 _STATE = {True: "stable", False: "unstable", None: "-"}
 
 
 def stability_table(
-    title: str, report: StabilityReport, found: LockIn | None, both: Thresholds | None = None
+    title: str,
+    report: StabilityReport,
+    found: LockIn | None,
+    both: Thresholds | None = None,
+    output: Path | None = None,
 ) -> str:
     """Steady sliding, its modes and both thresholds of friction; below that what there is along a key."""
     rest, critical, discrete = report.equilibrium, report.critical, report.discrete
@@ -60,6 +66,8 @@ def stability_table(
         ]
     if both and both.sentence:
         rows.append(("in a sentence", both.sentence))
+    if output:
+        rows.append(("file", str(output)))
     return two_columns(title, rows) + (_lock_in(found) if found else "")
 
 
@@ -145,7 +153,7 @@ def advice_table(report: AdviceReport) -> str:
     return "\n\n".join((two_columns(report.title, rows), *grids, two_columns("", ends)))
 
 
-def branch_table(title: str, found: Answers, units: str) -> str:
+def branch_table(title: str, found: Answers, units: str, output: Path | None = None) -> str:
     """Each branch with its special points, then the answer in a sentence."""
     rows = [
         ("along", f"{found.parameter} from {found.lower:g} to {found.upper:g} {units.removeprefix('1')}".strip()),
@@ -158,7 +166,7 @@ def branch_table(title: str, found: Answers, units: str) -> str:
         stable = sum(point.stable for point in each.points)
         head = f"branch {number}: {each.kind}, {len(each.points)} motions, {stable} of them stable"
         parts.append(f"{head}{f' ({each.note})' if each.note else ''}\n{grid(_special_points(each))}")
-    parts.append(two_columns("", [("in a sentence", found.sentence)]))
+    parts.append(two_columns("", [("in a sentence", found.sentence), ("file", [str(output)] if output else [])]))
     return "\n\n".join(parts)
 
 

@@ -159,7 +159,7 @@ def check_table(title: str, found: Check) -> str:
         ("contact stiffness 2ak", text_of(system.contact_stiffness, "N/m")),
         ("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         ("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
-        ("shortest wave passes at", text_of(system.passing_frequency, "Hz")),
+        ("shortest wave passes at", text_of(system.passing_frequency or None, "Hz")),
         ("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps:.15g} steps"),
         ("steps per period", [f"{found.steps_per_period:.4g} of the fastest motion"] * has_step),
         ("fixed-point contraction", [f"{limits.contraction:.3g} (1 or more: it may diverge)"] * has_step),
@@ -204,7 +204,7 @@ def sweep_table(report: SweepReport) -> str:
         told = (found.variables or {})["critical_sentence"] if found.points == 1 else []
         rows.append(("in a sentence", [str(each) for each in told if each]))
     speed = report.points_per_second
-    cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the workers' time not on points" if speed else ""
+    cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the time not on points" if speed else ""
     rows += [
         ("note", found.sentences),
         ("failed", [f"{found.failed} points"] if found.failed else []),
@@ -285,7 +285,7 @@ def comparison_table(report: ComparisonReport) -> str:
         ("in a case", ", ".join(f"{key} = {json.dumps(each)}" for key, each in report.in_a_case.items()) or []),
         ("file", str(report.output)),
     ]
-    best_entries = "No other is better in both error and time:\n" + _entries(front)
+    best_entries = "No other has a smaller error in less time:\n" + _entries(front)
     others = "The finest of the others:\n" + _entries(finest.values())
     return "\n\n".join((best_entries, others, two_columns(report.title, rows)))
 

@@ -9,7 +9,7 @@ from brakecli.plots import style
 
 _WIDTH, _ROW, _BINS = 9.6, 0.36, 40  # inches; of a bar; bins of a histogram, at most
 _SQUEALS, _OTHERS = style.VERMILION, style.BLUE
-NAMES = {"critical_below": "critical friction below own"}
+NAMES = {"critical_below": "critical friction below the brake's own"}
 
 
 def draw(result: StoredResult) -> Figure:

@@ -131,7 +131,11 @@ class AdviceReport:
             yield f"no key alone gives a margin of {100.0 * self.wanted_margin:.3g} %"
             return
         critical = best.critical_friction
-        effect = f"gives {critical:.3g}" if critical is not None else "takes the instability away"
+        effect = (
+            f"raises the critical friction to {critical:.3g}"
+            if critical is not None
+            else "takes the instability away"
+        )
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
         if self.squeal and best.squeal:
             own, left = self.squeal.squeal_probability, best.squeal.squeal_probability

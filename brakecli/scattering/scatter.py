@@ -92,9 +92,9 @@ class ScatterReport:
         if self.failed:
             found += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
         if first := self.indices.first:
-            by = " and ".join(f"{self.indices.total[name]:.0%}" for name in first)
-            decide = "decides" if len(first) == 1 else "decide"
-            found += f"; {' and '.join(first)} {decide} most on {self.indices.of.replace('_', ' ')}, by {by}"
+            named = _listed(first), _listed([f"{self.indices.total[name]:.0%}" for name in first])
+            decide, shared = ("decides", "") if len(first) == 1 else ("decide", ", each together with the others")
+            found += f"; {named[0]} {decide} most on {self.indices.of.replace('_', ' ')}, by {named[1]}{shared}"
         return found
 
     def numbers(self) -> dict[str, Any]:
@@ -110,6 +110,12 @@ class Drawing:
     others: Floats | None  # the same of the indices
     sweep: LoadedSweep  # of the samples, and behind them of the indices, if those are asked for the same
     by_eigenvalues: LoadedSweep | None  # of the indices, if those are asked for eigenvalues beside runs
+
+
+def _listed(words: list[str]) -> str:
+    """Words as a sentence lists them: a, b and c."""
+    *before, last = words
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 def draw(loaded: LoadedStudy) -> Drawing:

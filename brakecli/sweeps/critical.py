@@ -70,7 +70,7 @@ def search(critical: Critical, line: Line) -> Search:
     undamped = is_undamped(system_of(case).coefficients)
     told = not waves or not (explorer.waves is None or undamped or found.outcome is Outcome.UNDECIDED)
     words = [answers.sentence] if told else []
-    if lasting.value is not None:
+    if lasting.value not in (None, found.value):
         words.append(f"from its own start it vibrates from {lasting.value:.4g} on")
     return found._replace(
         sustained=lasting.value,

@@ -69,10 +69,11 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
         seen.add(value)
         return end(value).lasts
 
-    seen = set[float]()
+    seen, just_below = set[float](), math.nan
     if found.outcome is Outcome.FOUND:
         # the bracket of a loss of stability may be far narrower than is asked here, and runs there take long
-        low, high, stride = max(low, found.lower - 0.5 * tolerance), min(high, found.upper), tolerance
+        just_below = low = max(low, found.lower - 0.5 * tolerance)
+        high, stride = min(high, found.upper), tolerance
         while lasts(low) is not False and low > line.low:
             low, high = max(line.low, low - stride), low if lasts(low) else high
             stride *= GALLOP
@@ -82,6 +83,8 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
         return ended(None, Outcome.SUSTAINED if lasts(high) else Outcome.IN_PART)
     if not lasts(high):
         return ended(None, Outcome.DAMPED)
+    if low == just_below:  # vibration begins where stability is lost
+        return ended(found.value, Outcome.FOUND)
     # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
     fading, _ = bisect(lambda value: lasts(value) is False, low, high, width=tolerance)
     _, lasting = bisect(lambda value: not lasts(value), fading, high, width=tolerance)

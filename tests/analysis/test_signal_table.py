@@ -1,5 +1,6 @@
 """The table of measured signals: every row decides somewhere, and every threshold moves a verdict."""
 
+import re
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
@@ -9,6 +10,7 @@ import pytest
 
 from brakecli.analysis.regime.of_signal import Measurand, Signal, look
 from brakecli.analysis.regime.signal_table import ROWS, SignalAnswers, SignalThresholds, decide
+from brakecli.files.fields import evidence_unit
 from tests.analysis.measured_signals import Array, clipped, measured, stick_slip
 
 SINE = SignalAnswers(
@@ -125,3 +127,14 @@ def test_every_row_and_every_threshold_stands_in_the_documentation() -> None:
         assert f"| {row.name} |" in page
     for name, value in vars(SignalThresholds()).items():
         assert f"`{name}` ({value:g})" in page
+
+
+def test_the_evidence_has_the_units_of_the_documentation() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "measured-signals.md").read_text()
+    _, _, evidence = page.partition("## The evidence")
+    rows = re.findall(r"^\| (`.*?`) \| ?(.*?) ?\|", evidence, re.M)
+    told = {name: unit for names, unit in rows for name in names.split(", ")}
+    assert {"`events`", "`samples_per_cycle`", "`noise`"} < {*told}
+    for name, unit in told.items():
+        if unit in ("1", ""):
+            assert evidence_unit(name.strip("`")) == "", name

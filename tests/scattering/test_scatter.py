@@ -264,7 +264,7 @@ def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
             assert told[name] == dict(zip(keys, result.read("/", name).tolist(), strict=True))
         assert result.attributes["sentence"] == told["sentence"]
     shown = command("scatter", "study.toml", "--force", cwd=tmp_path).out
-    assert "critical friction below own" in shown
+    assert "critical friction below the brake's own" in shown
     assert "What decides on critical friction" in shown
 
 

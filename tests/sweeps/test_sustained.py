@@ -142,6 +142,14 @@ def test_slow_decay_on_a_smooth_pad_is_no_hysteresis(
     assert lives[0] - tolerance < answer.sustained < lives[1] + tolerance
 
 
+def test_what_fades_right_below_the_critical_value_lasts_from_that_value_on() -> None:
+    """Below its critical friction nothing lasts of the squeal shoe, as its branches show."""
+    answer = found(SQUEAL, 0.0, 2.0, tolerance=0.02)
+    assert answer.outcome is answer.sustained_outcome is Outcome.FOUND
+    assert answer.sustained == answer.value
+    assert "its own start" not in answer.sentence
+
+
 def test_what_lasts_at_the_lower_bound_only_does_not_last_throughout() -> None:
     """Beyond -13.95 degrees sliding is stable, and runs of another integrator die out at -12.56 and -11.10."""
     answer = found(ANGLED, -27.1, -11.1, "link2__angle_deg", tolerance=0.05)

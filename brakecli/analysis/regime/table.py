@@ -233,8 +233,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "forced, neighbours",
         lambda a, t: a.without_waves == Fate.DIES and together(a, t),
-        "only the roughness shakes the shoe: without it the vibration dies out, and neighbours come together at "
-        "{a.exponent:.3g} 1/s",
+        "only the roughness shakes the shoe: without it the vibration dies out, and small disturbances "
+        "have a growth rate of {a.exponent:.3g} 1/s",
         "",
         *_FORCED,
     ),
@@ -261,15 +261,16 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "forced, roughness gives",
         lambda a, t: together(a, t) and steady(a, t) and roughness_gives_most(a, t) and not a.undamped,
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
-        "{a.power_of_friction:.2g} W, and neighbours come together at {a.exponent:.3g} 1/s",
+        "{a.power_of_friction:.2g} W, and small disturbances have a growth rate of {a.exponent:.3g} 1/s",
         "",
         *_FORCED,
     ),
     Row(
         "forced, another level",
         lambda a, t: together(a, t) and steady(a, t) and another(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: neighbours come together at {a.exponent:.3g} 1/s, and vx has "
-        "{a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the roughness",
+        "only the roughness shakes the shoe: small disturbances have a growth rate of {a.exponent:.3g} 1/s, and "
+        "vx has {a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the "
+        "roughness",
         "",
         *_FORCED,
     ),
