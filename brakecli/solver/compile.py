@@ -65,26 +65,33 @@ class _Waiting(CPUDispatcher):
     """
 
     signature: Any
-    private: bool
+    private = True
 
-    def __call__(self, *arguments: Any) -> Any:
+    def __call__(self, *arguments: Any, **named: Any) -> Any:
         if self.private:
             name = vars(self)["__name__"]
             raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
         self.ready()
-        self.__class__ = CPUDispatcher  # type: ignore[assignment]  # whose calls take no way through Python
-        return self(*arguments)
+        return self(*arguments, **named)
+
+    def __reduce__(self) -> Any:
+        if self.private:
+            return super().__reduce__()
+        self.ready()
+        return self.__reduce__()  # now that of a kernel which is loaded: it names what is compiled
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What the compiler asks for where another kernel calls this one."""
         self.ready()
-        return super().get_call_template(args, kws)
+        return CPUDispatcher.get_call_template(self, args, kws)  # as it may no longer be one that waits
 
     def ready(self) -> None:
         """Load the machine code, or compile it, in one thread alone."""
         with global_compiler_lock:
             if not self.overloads:
                 compile_for(self, self.signature)
+        if not self.private:
+            self.__class__ = CPUDispatcher  # type: ignore[assignment]  # whose calls take no way through Python
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
@@ -109,6 +116,13 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
     return compile_
 
 
+def ready(function: Any) -> Any:
+    """A kernel whose machine code is loaded, as its first call is timed."""
+    if isinstance(function, _Waiting):
+        function.ready()
+    return function
+
+
 _functions: list[Any] = []  # interpreted kernels, found by their number
 
 
@@ -119,9 +133,7 @@ def address(function: Any) -> int:
         if function not in _functions:
             _functions.append(function)
         return _functions.index(function)
-    if not function.overloads:  # no kernel that has been compiled here calls it by its name
-        function.ready()
-    (compiled,) = function.overloads.values()
+    (compiled,) = ready(function).overloads.values()
     return int(compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name))
 
 

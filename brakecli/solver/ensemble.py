@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from brakecli import stop
-from brakecli.solver.compile import Floats
+from brakecli.solver.compile import Floats, ready
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
 from brakecli.solver.lanes import advance
@@ -83,6 +83,7 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
 
 
 def _run_lanes(systems: list[System]) -> list[Motion | None]:
+    ready(advance)
     begin, alike, number = time.perf_counter(), systems[0], len(systems)
     o = filled([*systems, *systems[-1:] * (LANES - number)])
     rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))

@@ -13,7 +13,7 @@ from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import FILE_BYTES, MOST_BYTES, check, refuse, within_range
 from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
-from brakecli.sweeps.pilot import WORKER_SECONDS, Pilot
+from brakecli.sweeps.pilot import UNEVEN, WORKER_SECONDS, Pilot
 from brakecli.sweeps.plan import Plan, Settings, label
 from brakecli.sweeps.tables import Critical
 
@@ -66,12 +66,14 @@ def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
     `spare`: there are no workers where they would take longer to start than the points take. Searches are computed
     with them where verdicts come early, or eigenvalues answer; others take too long, and are guessed.
     """
-    samples, tables, forced, early, failing, critical = 0, 0.0, 0.0, True, list[str](), plan.sweep.critical
+    samples, tables, forced, dearest, early = 0, 0.0, 0.0, 0.0, True
+    failing, critical = list[str](), plan.sweep.critical
     by_simulation = critical is not None and critical.method == "simulation"
     for point in sorted({0, plan.points - 1}):
         with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
-            refuse(check(system))
+            refuse(found := check(system))
+            dearest = max(dearest, found.seconds)
             samples, early = max(samples, system.samples), early and may_be_early(system)
             tables = max(tables, system.table_bytes)
             if critical is not None and by_simulation:
@@ -80,10 +82,11 @@ def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
     pilot = Pilot(plan, workers, with_searches=not guessed)
     pilot.look()
     each, samples = pilot.seconds, max(samples, pilot.samples)
+    at_least = guessed or pilot.at_least or dearest > UNEVEN * pilot.guess
     if guessed:
         each += _SEARCH_RUNS * each + _SMOOTH_SECONDS + forced
     records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
-    if spare and not (guessed or pilot.at_least) and plan.units * plan.unit_length * each < WORKER_SECONDS:
+    if spare and not at_least and plan.units * plan.unit_length * each < WORKER_SECONDS:
         workers = pilot.workers = 0
     held = _SAMPLE_BYTES * samples * max(workers, 1) * pilot.together
     return Estimate(
@@ -92,7 +95,7 @@ def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
         seconds=pilot.sweep_seconds(each),
         memory=(_WORKER_BYTES + tables) * (workers + 1) + held + in_parent * records,
         file_size=_RECORD_BYTES * records + FILE_BYTES,
-        at_least=guessed or pilot.at_least,
+        at_least=at_least,
         together=pilot.together,
         refused=tuple(failing),
     )

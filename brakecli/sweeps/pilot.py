@@ -53,6 +53,7 @@ class Pilot:
     points: list[int] = field(default_factory=list)  # that were looked at
     together: int = 1  # points that are computed side by side
     samples: int = 0  # of a history, at most
+    guess: float = 0.0  # s of a point that was looked at, at most, by formulas
     in_lanes: int = 0  # points that have begun in lanes,
     alone: int = 0  # and how many of them were not certified there
     begun: bool = False  # runs were only begun, and may take longer
@@ -131,6 +132,7 @@ class Pilot:
         systems = [each.check.system for each in ready]
         self.points += range(self._first(at, size), self._first(at, size) + size)
         self.samples = max([self.samples, *(system.samples for system in systems)])
+        self.guess = max([self.guess, *(each.check.seconds for each in ready)])
         begin = process_time()
         with within_range():
             certified = certify_together(systems)
@@ -172,6 +174,7 @@ class Pilot:
         if not isinstance(start, Begun):
             return 0.0
         self.samples = max(self.samples, start.check.system.samples)
+        self.guess = max(self.guess, start.check.seconds)
         if self._guess(start.check) > LONGEST:
             return self._alone(start)
         times = list[float]()

@@ -264,7 +264,10 @@ SQUEALS = {"friction__coefficient": 0.7, "solver__duration": 0.05}
                 "→",
             ],
         ),
-        (NEVER_STABLE, ["squeals at", "unstable at any friction, however small", "raises the critical friction to 0.36"]),
+        (
+            NEVER_STABLE,
+            ["squeals at", "unstable at any friction, however small", "raises the critical friction to 0.36"],
+        ),
     ],
 )
 def test_the_answer_is_a_sentence(changes: Tables, words: list[str]) -> None:

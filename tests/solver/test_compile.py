@@ -100,7 +100,7 @@ def test_a_kernel_for_kernels_alone_cannot_be_called_from_python() -> None:
 
 LOADED = """
 from threading import Barrier, Thread
-from brakecli.solver import friction, implicit_step
+from brakecli.solver import contact, friction, implicit_step, schemes
 kernels = friction.minimise, implicit_step.newton, implicit_step._try_force
 print(*(len(each.overloads) for each in kernels))
 at_once, found = Barrier(8), []
@@ -115,6 +115,15 @@ for each in threads:
 for each in threads:
     each.join()
 print(len(found), *set(found), *(len(each.overloads) for each in kernels))
+scheme, evaluate = schemes.load("two-layer"), contact.load("midpoint")
+print(len(scheme.advance.overloads), len(evaluate.overloads))  # before anything is timed
+"""
+NAMED = """
+import pickle
+from brakecli.solver import friction
+moved = pickle.loads(pickle.dumps(friction.minimise))
+print(moved(1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0))
+print(friction.minimise(a_11=1.0, a_12=0.0, a_22=1.0, g_1=3.0, g_2=0.0, g_0=1.0, belt=0.0))
 """
 
 
@@ -122,7 +131,8 @@ print(len(found), *set(found), *(len(each.overloads) for each in kernels))
 def test_a_cached_kernel_is_loaded_by_its_first_call_even_by_eight_threads_at_once(tmp_path: Path) -> None:
     """One for kernels alone is compiled with its caller and never loaded."""
     assert python(LOADED, tmp_path).splitlines()[0] == "1 1 1"
-    assert python(LOADED, tmp_path).splitlines() == ["0 0 0", "8 (2.0, 0.0, 1.0) 1 0 0"]
+    assert python(LOADED, tmp_path).splitlines() == ["0 0 0", "8 (2.0, 0.0, 1.0) 1 0 0", "1 1"]
+    assert python(NAMED, tmp_path) == 2 * "(2.0, 0.0, 1.0)\n"
 
 
 SELF_CONTAINED = """

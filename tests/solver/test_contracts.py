@@ -239,4 +239,5 @@ def test_more_evaluators_than_a_run_can_count_are_refused(monkeypatch: pytest.Mo
 
 def test_the_loop_is_compiled_for_every_scheme_at_once() -> None:
     """One signature: what a scheme or an evaluator hands over is a function pointer, not a type of its own."""
+    assert schemes.load("two-layer").advance is schemes.load("three-layer").advance is advance
     assert len(getattr(advance, "signatures", [None])) == 1

@@ -106,6 +106,20 @@ def test_a_search_that_is_too_long_to_be_computed_says_at_least(tmp_path: Path) 
     assert "at least" in estimate(write_sweep(tmp_path, critical).plan, 1).sentence()  # runs with a given step
 
 
+def test_a_long_run_at_a_corner_that_no_drawn_place_shows_means_at_least(tmp_path: Path) -> None:
+    durations = ", ".join([*(f"0.0{n}" for n in range(10, 90, 2)), "200.0"])
+    short, long = (
+        estimate(
+            write_sweep(tmp_path, frictions(4), axis("solver.duration", f"values = [{values}]")).plan,
+            2,
+            spare=True,
+        )
+        for values in (durations.removesuffix(", 200.0"), durations)
+    )
+    assert (short.at_least, short.workers) == (False, 0)
+    assert (long.at_least, long.workers) == (True, 2)
+
+
 def test_a_short_sweep_is_computed_without_workers_unless_they_are_asked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

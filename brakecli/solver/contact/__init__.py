@@ -68,7 +68,9 @@ def load(name: str) -> Any:
     """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
-    return cast(EvaluatorModule, import_module(EVALUATORS[name].module)).evaluate
+    from brakecli.solver.compile import ready
+
+    return ready(cast(EvaluatorModule, import_module(EVALUATORS[name].module)).evaluate)
 
 
 def load_press(name: str) -> Any:

@@ -148,4 +148,8 @@ SCHEMES: dict[str, Scheme] = {
 
 def load(name: str) -> SchemeModule:
     """The module of a scheme; its kernels are compiled on the first call of a new version."""
-    return cast(SchemeModule, import_module(SCHEMES[name].module))
+    from brakecli.solver.compile import ready
+
+    module = cast(SchemeModule, import_module(SCHEMES[name].module))
+    ready(module.advance)
+    return module
