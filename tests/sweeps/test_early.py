@@ -17,6 +17,7 @@ from brakecli.case.case import Case
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
+from brakecli.files.fields import POINT
 from brakecli.runs.settled import Judged
 from brakecli.solver.flow.smooth import DONE, EVENTFUL, SmoothFlow
 from brakecli.solver.motion import solve
@@ -51,6 +52,8 @@ def compare(found: Judged[Ending], case: Case) -> None:
     """A whole run says the same, its numbers within what its samples show of them."""
     ours, whole, system = found.verdict, simulate(case).verdict, found.motion.system
     assert (ours.regime, ours.excitation, ours.settled) == (whole.regime, whole.excitation, whole.settled)
+    of_points = [field.name for field in POINT if getattr(whole, field.name, None) is not None]
+    assert [name for name in of_points if getattr(ours, name) is None] == []  # what a sweep would not give
     fast, interval = system.natural_frequencies[1], system.interval
     seen = 0.5 * (math.pi * fast * interval) ** 2  # of an amplitude between two samples, at the fastest frequency
     depth = system.load_at_start / (system.coefficients.c_yy + system.contact_stiffness)
