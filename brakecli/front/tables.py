@@ -199,8 +199,8 @@ def sweep_table(report: SweepReport) -> str:
     ]
     if found.critical is not None and critical is not None:
         count, least, largest = found.critical
-        span = f"{least:.6g} to {largest:.6g}, " if count else ""
-        rows.append((f"critical {critical.parameter}", f"{span}found at {count} of {found.points} points"))
+        span = f"{least:.6g} to {largest:.6g}, found" if count > 1 else f"{least:.6g}, found" if count else "found"
+        rows.append((f"critical {critical.parameter}", f"{span} at {count} of {found.points} points"))
         told = (found.variables or {})["critical_sentence"] if found.points == 1 else []
         rows.append(("in a sentence", [str(each) for each in told if each]))
     speed = report.points_per_second
