@@ -71,27 +71,26 @@ class _Waiting(CPUDispatcher):
         if self.private:
             name = vars(self)["__name__"]
             raise TypeError(f"{name} has no wrapper for calls from Python: only other kernels can call it")
-        self.ready()
-        return self(*arguments, **named)
+        return ready(self)(*arguments, **named)
 
     def __reduce__(self) -> Any:
-        if self.private:
-            return super().__reduce__()
-        self.ready()
-        return self.__reduce__()  # now that of a kernel which is loaded: it names what is compiled
+        """One that is loaded says what is compiled, also for another process."""
+        return super().__reduce__() if self.private else ready(self).__reduce__()
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """What the compiler asks for where another kernel calls this one."""
-        self.ready()
-        return CPUDispatcher.get_call_template(self, args, kws)  # as it may no longer be one that waits
+        return CPUDispatcher.get_call_template(ready(self), args, kws)
 
-    def ready(self) -> None:
-        """Load the machine code, or compile it, in one thread alone."""
+
+def ready(function: Any) -> Any:
+    """A kernel whose machine code has been loaded, or compiled: where it is not to be loaded by its first call."""
+    if isinstance(function, _Waiting):
         with global_compiler_lock:
-            if not self.overloads:
-                compile_for(self, self.signature)
-        if not self.private:
-            self.__class__ = CPUDispatcher  # type: ignore[assignment]  # whose calls take no way through Python
+            if not function.overloads:
+                compile_for(function, function.signature)
+        if not function.private:  # its calls take no way through Python; another thread may have done so meanwhile
+            function.__class__ = CPUDispatcher  # type: ignore[assignment]
+    return function
 
 
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
@@ -110,17 +109,10 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         if not config.DISABLE_JIT:
             compiled.__class__, compiled.signature, compiled.private = _Waiting, signature, private
             if not private and not is_cached(compiled, signature):  # before anything is timed
-                compiled.ready()
+                ready(compiled)
         return compiled  # type: ignore[no-any-return]
 
     return compile_
-
-
-def ready(function: Any) -> Any:
-    """A kernel whose machine code is loaded, as its first call is timed."""
-    if isinstance(function, _Waiting):
-        function.ready()
-    return function
 
 
 _functions: list[Any] = []  # interpreted kernels, found by their number
