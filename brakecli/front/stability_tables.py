@@ -53,7 +53,9 @@ def stability_table(
     ]
     for mode in report.modes:
         motion = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
-        shape = f"y/x {mode.shape:.3g} at {mode.shape_phase:.0f}°" if mode.shape is not None else "along y alone"
+        shape = "along y alone"
+        if mode.shape is not None and mode.shape_phase is not None:
+            shape = f"y/x {mode.shape:.3g} at {round(mode.shape_phase)}°"
         what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
         rows.append((f"mode at {mode.frequency:.5g} Hz", what))
     if discrete:
@@ -71,12 +73,12 @@ def stability_table(
     return two_columns(title, rows) + (_lock_in(found) if found else "")
 
 
-def _coexisting(both: Thresholds | None) -> list[Row]:
+def _coexisting(both: Thresholds | Answers | None, units: str = "") -> list[Row]:
     """From where on a vibration can exist, and the push that it needs, where that is known."""
     if both is None or both.coexists_from is None:
         return []
     barrier = [] if both.barrier is None else [("barrier", text_of(both.barrier, "m", ".4g"))]
-    return [("can vibrate from", f"{both.coexists_from:.7g}"), *barrier]
+    return [("can vibrate from", text_of(both.coexists_from, units, ".7g")), *barrier]
 
 
 def _lock_in(found: LockIn) -> str:
@@ -158,8 +160,7 @@ def branch_table(title: str, found: Answers, units: str, output: Path | None = N
     rows = [
         ("along", f"{found.parameter} from {found.lower:g} to {found.upper:g} {units.removeprefix('1')}".strip()),
         ("critical", text_of(found.critical, units.removeprefix("1"), ".7g")),
-        ("can vibrate from", text_of(found.coexists_from, units.removeprefix("1"), ".7g")),
-        ("barrier", text_of(found.barrier, "m", ".4g")),
+        *_coexisting(found, units.removeprefix("1")),
     ]
     parts = [two_columns(title, rows)]
     for number, each in enumerate(found.branches):
