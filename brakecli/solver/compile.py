@@ -59,7 +59,7 @@ events.register("numba:compile", _Compiling())
 
 
 class _Waiting(CPUDispatcher):
-    """A kernel that is loaded when it is first called: a run needs a third of those that it imports.
+    """A kernel that is loaded when it is first called: a run calls a quarter of those that it imports.
 
     One for other kernels alone has no wrapper for calls from Python, which would otherwise end the process.
     """
