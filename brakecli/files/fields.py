@@ -68,12 +68,12 @@ MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
 _EVIDENCE_UNITS = {
     "1/s": r"growth.*|exponent.*|even(_.*)?|rate_.*",
     "m/s": r"amplitude_v.*|level.*",
-    "m": r"amplitude(?!_v).*",
+    "m": r"amplitude.*",
     "Hz": r"frequency.*|line_freq.*|ringing.*",
     "W": r"power_.*|friction_error.*|roughness_error.*",
     "s": r"duration.*|seconds.*|slowest.*|period_.*|to_limit.*",
 }
-"""Patterns of the names of the evidence; all others are pure numbers."""
+"""Patterns of the names of the evidence, the first that fits; all others are pure numbers."""
 
 
 def evidence_unit(name: str) -> str:

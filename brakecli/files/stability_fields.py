@@ -146,6 +146,8 @@ SCATTER = (
 )
 SAMPLE = integer("sample", "number of the sample, from 0")
 SET = integer("set", "number of its sequence: sets know nothing of each other")
+PROBABLE = {"critical_below": "critical friction below the brake's own"}
+"""Words for what a sample of a scatter may be, where its name does not say it."""
 SCATTERED = (
     *named(POINT, "status", "regime", "excitation"),
     integer("squeal", "whether it squeals (0, 1)"),

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from brakecli.scattering.scatter import ScatterReport
     from brakecli.sweeps.lock_in import LockIn
 
-_NAMES = {"critical_below": "critical friction below the brake's own", "squeal": "squeal"}
 _STATE = {True: "stable", False: "unstable", None: "-"}
 
 
@@ -202,7 +201,7 @@ def scatter_table(report: ScatterReport) -> str:
 def _probabilities(report: ScatterReport) -> dict[str, list[str]]:
     shown = report.probabilities.values()
     return {
-        "a sample is": [_NAMES.get(name, name) for name in report.probabilities],
+        "a sample is": [fields.PROBABLE.get(name, name) for name in report.probabilities],
         "probability": [f"{each.value:.2%}" for each in shown],
         "95 % interval": [f"{each.lower:.2%} to {each.upper:.2%}" for each in shown],
     }

@@ -5,11 +5,11 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from brakecli.files.read import StoredResult
+from brakecli.files.stability_fields import PROBABLE
 from brakecli.plots import style
 
 _WIDTH, _ROW, _BINS = 9.6, 0.36, 40  # inches; of a bar; bins of a histogram, at most
 _SQUEALS, _OTHERS = style.VERMILION, style.BLUE
-NAMES = {"critical_below": "critical friction below the brake's own"}
 
 
 def draw(result: StoredResult) -> Figure:
@@ -61,7 +61,7 @@ def _probabilities(axes: Axes, names: list[str], value: style.Array, low: style.
     colours = [_SQUEALS if name == "squeal" else _OTHERS for name in names]
     off = np.clip(np.array([value - low, high - value]), 0.0, None)
     axes.barh(places, value, height=0.62, color=colours, xerr=off, error_kw={"ecolor": style.DARK, "capsize": 3.0})
-    axes.set_yticks(places, labels=[NAMES.get(name, name) for name in names], parse_math=False)
+    axes.set_yticks(places, labels=[PROBABLE.get(name, name) for name in names], parse_math=False)
     axes.set_xlim(0.0, min(1.0, 1.1 * float(high.max())) or 1.0)
     axes.xaxis.set_major_formatter(lambda each, _: f"{100.0 * each:.3g} %")
     axes.set_title("probability, with its 95 % interval")

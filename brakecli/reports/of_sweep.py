@@ -20,6 +20,7 @@ from brakecli.files.stability_fields import (
     LOCK_IN,
     OUTCOME,
     PROBABILITY,
+    PROBABLE,
     SCATTER,
     SCATTERING,
     SPECIAL,
@@ -29,7 +30,6 @@ from brakecli.plots import style
 from brakecli.plots.gather import gather, numeric
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
-from brakecli.plots.scatter import NAMES
 from brakecli.plots.sweep import SweepPicture
 from brakecli.reports.blocks import (
     PAGE,
@@ -174,7 +174,7 @@ def part_of_other(result: StoredResult) -> Part:
         answer.append(said)
         sections.insert(0, Section("Study", tables_of_study))
         names = OUTCOME, *PROBABILITY
-        rows = [(NAMES.get(name, name), *more) for name, *more in _rows(result, "/", names)]
+        rows = [(PROBABLE.get(name, name), *more) for name, *more in _rows(result, "/", names)]
         tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
         shares = zip(rows, style.read_column(result, "probability").tolist(), strict=True)
         numbers = {**{f"probability: {name}": (share, "1") for (name, *_), share in shares}, **numbers}

@@ -130,12 +130,9 @@ class AdviceReport:
         if best.to is None:
             yield f"no key alone gives a margin of {100.0 * self.wanted_margin:.3g} %"
             return
-        critical = best.critical_friction
-        effect = (
-            f"raises the critical friction to {critical:.3g}"
-            if critical is not None
-            else "takes the instability away"
-        )
+        critical, effect = best.critical_friction, "takes the instability away"
+        if critical is not None:
+            effect = f"makes it stable up to a friction of {critical:.3g}"
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
         if self.squeal and best.squeal:
             own, left = self.squeal.squeal_probability, best.squeal.squeal_probability

@@ -266,7 +266,7 @@ SQUEALS = {"friction__coefficient": 0.7, "solver__duration": 0.05}
         ),
         (
             NEVER_STABLE,
-            ["squeals at", "unstable at any friction, however small", "raises the critical friction to 0.36"],
+            ["squeals at", "unstable at any friction, however small", "makes it stable up to a friction of 0.36"],
         ),
     ],
 )
