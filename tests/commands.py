@@ -228,7 +228,9 @@ def _serve() -> None:
     from matplotlib.backends import backend_agg, backend_svg  # noqa: F401 - which a picture loads as it is saved
 
     from brakecli.__main__ import main
+    from tests import sentences
 
+    sentences.read_all()
     for path in sorted((ROOT / "brakecli").rglob("[!_]*.py")):  # all that any command loads
         if path.stem not in ("api", "accessor"):
             import_module(".".join(path.relative_to(ROOT).with_suffix("").parts))

@@ -7,6 +7,7 @@ from importlib import import_module
 import pytest
 from hypothesis import settings
 
+from tests import sentences
 from tests.commands import ROOT, warm_up
 
 # Also under nohup and in the background of a shell, whose commands would not hear them
@@ -14,6 +15,7 @@ signal.signal(signal.SIGHUP, signal.SIG_DFL)
 signal.signal(signal.SIGINT, signal.default_int_handler)
 settings.register_profile("repeatable", deadline=None, derandomize=True, print_blob=False)
 settings.load_profile("repeatable")
+sentences.read_all()
 
 # Two processes that compile the kernels of a new version from both ends take half the time of one
 if worker := os.environ.get("PYTEST_XDIST_WORKER"):

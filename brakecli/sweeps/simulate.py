@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from brakecli.analysis.regime.classify import classify
+from brakecli.analysis.regime.classify import classify, look, verdicts
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory, theories_of
 from brakecli.case.case import Case
@@ -88,20 +88,22 @@ def judged_together(
 ) -> list[tuple[Judged[Motion] | None, Theory]]:
     """The motions that are certified, with their verdicts, and all theories; None where a point has to run alone.
 
-    No number of one depends on the others, and numbers that no brake has concern none of them.
+    It has to where its motion in a lane does not show all that is asked of it. No number of one depends on the
+    others, and numbers that no brake has concern none of them.
     """
     theories = theories_of(systems)
 
-    def verdicts(places: list[int]) -> list[Judged[Motion] | None]:
-        known = [each for i in places if (each := certified[i])]
+    def judge(places: list[int]) -> list[Judged[Motion] | None]:
+        known = {i: each for i in places if (each := certified[i])}
         try:
-            given = zip(known, places, strict=True)
-            found = classify([in_memory(each.motion, systems[i], theories[i]) for each, i in given], in_full=False)
+            shown = look([in_memory(each.motion, systems[i], theories[i]) for i, each in known.items()])
+            enough = {i: each for i, each in zip(known, shown, strict=True) if each.enough}
+            found = dict(zip(enough, verdicts([*enough.values()], in_full=False), strict=True))
         except (ArithmeticError, np.linalg.LinAlgError, BrakecliError):
-            return [None] if len(places) == 1 else [each for i in places for each in verdicts([i])]
-        return [Judged(verdict, *each) for verdict, each in zip(found, known, strict=True)]
+            return [None] if len(places) == 1 else [each for i in places for each in judge([i])]
+        return [Judged(found[i], *known[i]) if i in found else None for i in places]
 
-    return [*zip(at_once([each and True for each in certified], verdicts), theories, strict=True)]
+    return [*zip(at_once([each and True for each in certified], judge), theories, strict=True)]
 
 
 def verdict_of(case: Case) -> Verdict | None:

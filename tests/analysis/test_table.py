@@ -4,12 +4,14 @@ import math
 from dataclasses import fields, replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.looks import LOOKS
 from brakecli.analysis.regime.table import CONTACT, ROUGH, SMOOTH, decide
+from tests import sentences
 
 LIMITS = Thresholds()
 MOVING = Answers(
@@ -121,7 +123,24 @@ def test_every_row_has_a_record_that_trips_it() -> None:
 
 
 def test_the_last_row_of_each_part_always_holds() -> None:
-    assert all(rows[-1].holds(Answers(), LIMITS) for rows in (SMOOTH, ROUGH, LOOKS))
+    for rows in (SMOOTH, ROUGH, LOOKS):
+        assert rows[-1].holds(Answers(), LIMITS)
+        assert rows[-1].decision(Answers()).reason
+
+
+def test_no_sentence_has_a_number_that_is_not_known() -> None:
+    """Whatever is not known; `sentences.read_all` reads what each record of the tests is told."""
+    rng, numbers = (
+        np.random.default_rng(47),
+        [name for name, value in MOVING._asdict().items() if type(value) is float],
+    )
+    records = [{**SHAKEN, **each} for each in ROUGH_ROWS.values()] + [*SMOOTH_ROWS.values(), *LOOK_ROWS.values()]
+    for record in records:
+        for _ in range(20):
+            drawn = rng.choice([math.nan, math.inf, -math.inf, 0.5, 0.5, 0.5], len(numbers)).tolist()
+            lost = {name: value for name, value in zip(numbers, drawn, strict=True) if not math.isfinite(value)}
+            found = decide(answers(**{**record, **lost}), LIMITS)
+            assert sentences.unknown_in(found.sentence) == []
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,8 @@
 """Points on rough pads whose runs are computed side by side."""
 
+import tomllib
+from contextlib import suppress
+from itertools import islice, product
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +12,9 @@ import pytest
 import tomli_w
 
 from brakecli.analysis.regime.classify import classify
+from brakecli.case.case import Case
 from brakecli.case.system import system_of
+from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
 from brakecli.runs.judge import asked, given
@@ -19,8 +24,9 @@ from brakecli.solver.history import array_history
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.simulate import judged_together, simulate
+from brakecli.sweeps.simulate import checked, judged, judged_together, simulate
 from brakecli.sweeps.workers.task import compute_units
+from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
 from tests.examples import ROUGH, make
 from tests.sweeps.helpers import axis, inline, interrupted, local, write_sweep
@@ -30,6 +36,7 @@ pytestmark = pytest.mark.usefixtures("compiled")
 TOLERANCE = 1e-3
 PROMISED: dict[str, Any] = ROUGH | {"solver": {"tolerance": TOLERANCE, "duration": 0.02}}
 PROMISED["output"] = {"sample_interval": 2.5e-4}
+OPENING = tomllib.loads((Path(__file__).parent / "opening.toml").read_text())
 
 
 def rough(folder: Path, num: int) -> LoadedSweep:
@@ -83,6 +90,51 @@ def test_what_a_sweep_leaves_out_of_a_verdict_changes_nothing_that_it_keeps(tmp_
         one, other = (values_of(kept, {"verdict": verdict}) for verdict in (whole, brief))
         assert one == other
         assert whole.reasons == brief.reasons
+
+
+def say_the_same(cases: list[Case]) -> int:
+    """Points of a sweep, computed side by side, say what runs of them say; how many of them lanes were enough for.
+
+    Each amplitude is off by what both promise of the largest x.
+    """
+    known = [checked(case) for case in cases]
+    systems, lanes = [each.system for each in known], 0
+    found = judged_together(systems, certify_together(systems))
+    for case, each, (by_lanes, theory) in zip(cases, known, found, strict=True):
+        point, run = judged(case, each, by_lanes, theory, whole=False), simulate(case)
+        one, other = point.verdict, run.verdict
+        assert (one.regime, one.excitation, one.settled) == (other.regime, other.excitation, other.settled)
+        assert one.frequency == other.frequency  # no lane has one
+        errors = [each.certificate.estimated_error for each in (point, run) if each.certificate is not None]
+        assert len(errors) == 2
+        largest = float(np.abs(run.motion.rows[:, 0]).max())
+        assert one.amplitude == pytest.approx(other.amplitude, abs=sum(errors) * largest)
+        lanes += by_lanes is not None
+    return lanes
+
+
+@pytest.mark.parametrize("name", OPENING)
+@pytest.mark.parametrize("every", counts(20, 1))
+def test_a_point_whose_pad_opens_says_what_a_run_of_it_says(name: str, every: int) -> None:
+    """Its regime takes powers, and its amplitude turning points, which no lane has."""
+    found, cases = OPENING[name], list[Case]()
+    for friction, speed in product(found["frictions"], found["speeds"]):
+        tables = {**found["case"], "friction": {"coefficient": friction}}
+        tables["wheel"] = {**tables["wheel"], "angular_speed": speed}
+        cases.append(make(tables))
+    assert say_the_same(cases[::every]) == 0
+
+
+@pytest.mark.parametrize("shoes", counts(8, 200))
+def test_a_point_of_random_shoes_says_what_a_run_of_it_says(shoes: int) -> None:
+    cases = list[Case]()
+    for tables in islice(random_shoes("full", 47), shoes):
+        with suppress(BrakecliError):  # one that sticks from the start, or has none
+            duration = min(tables["solver"]["duration"], 400.0 * tables["output"]["sample_interval"])
+            case = make({**tables, "solver": {"duration": duration, "tolerance": 1e-3}})
+            checked(case)
+            cases.append(case)
+    assert say_the_same(cases) > 0.3 * shoes
 
 
 def test_one_that_leaves_its_lane_is_certified_alone() -> None:

@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
+from brakecli.analysis.regime.decision import told
+
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 FADED = 3.0  # powers of e after which a change has ended: 5 % of it are left
@@ -138,7 +140,11 @@ class Answers(NamedTuple):
     @property
     def sticks(self) -> str:
         """How often the motion sticks."""
-        return f"with stick in {self.stick_cycles:.0%} of the cycles" if self.stick_cycles else "without stick"
+        return (
+            told("with stick in {a.stick_cycles:.0%} of the cycles", self)
+            if self.stick_cycles
+            else "without stick"
+        )
 
     @property
     def two_waves(self) -> float:
@@ -148,16 +154,16 @@ class Answers(NamedTuple):
     @property
     def lines(self) -> str:
         """Where the energy of vx lies."""
-        if self.band_share > self.harmonic_share:
+        if not self.band_share <= self.harmonic_share and math.isfinite(self.band_share):
             return f"{self.band_share:.0%} of the energy of vx in three narrow bands"
-        return f"{self.harmonic_share:.0%} of the energy of vx in one line and its harmonics"
+        return told("{a.harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
 
     @property
     def limit(self) -> str:
         """What it comes to on the smooth wheel."""
         if not math.isfinite(self.amplitude_without_waves):
             return "no limit cycle that was found"
-        return f"an amplitude of {self.amplitude_without_waves:.4g} m in a cycle of {self.ends_at:.4g} Hz"
+        return told("an amplitude of {a.amplitude_without_waves:.4g} m[ in a cycle of {a.ends_at:.4g} Hz]", self)
 
     @property
     def ends_at(self) -> float:

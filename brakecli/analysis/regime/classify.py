@@ -24,10 +24,19 @@ def classify(given: Sequence[Given], thresholds: Thresholds = _DEFAULT, *, in_fu
 
     Where not `in_full`, evidence and numbers that a sweep does not keep are left out; all others are the same.
     """
+    return verdicts(look(given, thresholds), in_full=in_full)
+
+
+def look(given: Sequence[Given], thresholds: Thresholds = _DEFAULT) -> list[Shown]:
+    """What histories show; where that is not `enough`, `verdicts` has to have another run of the same motion."""
     looked = seen([each.history for each in given], thresholds.settled_within)
-    shown = [Shown(*each, thresholds) for each in zip(given, looked, strict=True)]
+    return [Shown(*each, thresholds) for each in zip(given, looked, strict=True)]
+
+
+def verdicts(shown: Sequence[Shown], *, in_full: bool = True) -> list[Verdict]:
+    """The verdicts on what histories show."""
     found = [answers(each) for each in shown]
-    decisions = [decide(each, thresholds) for each in found]
+    decisions = [decide(answer, each.limits) for answer, each in zip(found, shown, strict=True)]
     numbers = lasting(shown, found, decisions, in_full=in_full)
     return [_verdict(*each, in_full=in_full) for each in zip(shown, found, decisions, numbers, strict=True)]
 

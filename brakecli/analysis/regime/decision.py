@@ -1,8 +1,12 @@
 """What a table decides: a regime, an excitation and the reason, by the first of its rows that holds."""
 
+import math
+import re
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
+from string import Formatter
 from typing import Any, Generic, NamedTuple, TypeVar
 
 
@@ -57,12 +61,51 @@ class Decision(NamedTuple):
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
 
+_OPTIONAL = re.compile(r"\[(.*?)\]")
+
+
+class UnknownNumberError(Exception):
+    """A sentence needs a number that is not known."""
+
+
+class _Known(Formatter):
+    """Writes what is known."""
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        """A value in a sentence; raises UnknownNumberError for a number that is not finite."""
+        if isinstance(value, float) and not math.isfinite(value):
+            raise UnknownNumberError
+        return str(super().format_field(value, format_spec))
+
+
+def told(text: str, answers: Any) -> str:
+    """A text with the numbers of answers; raises UnknownNumberError where one is not known.
+
+    What stands in [brackets] is left out then.
+    """
+    pieces = re.split(_OPTIONAL, text)
+    pieces[1::2] = [_told_or_nothing(piece, answers) for piece in pieces[1::2]]
+    pieces[::2] = [_Known().format(piece, a=answers) for piece in pieces[::2]]
+    return "".join(pieces)
+
+
+def _told_or_nothing(text: str, answers: Any) -> str:
+    """A text with the numbers of answers, or none where one is not known."""
+    try:
+        return told(text, answers)
+    except UnknownNumberError:
+        return ""
+
+
 A = TypeVar("A")  # the answers
 T = TypeVar("T")  # and the thresholds of a table
 
 
 class Row(NamedTuple, Generic[A, T]):
     """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers.
+
+    A row whose sentence needs a number that is not known does not hold, so that of the last one needs none. What
+    stands in [brackets] is said only where its numbers are known; so is what to do.
 
     `longer` says whether a longer run may decide where the row does not.
     """
@@ -76,12 +119,16 @@ class Row(NamedTuple, Generic[A, T]):
     longer: bool | Callable[[A], Any] = False
 
     def decision(self, answers: A) -> Decision:
-        """What it says of these answers."""
-        reason, advice = (text.format(a=answers) for text in (self.sentence, self.remedy))
+        """What it says of these answers; raises UnknownNumberError where they lack a number that it needs."""
+        reason, advice = told(self.sentence, answers), _told_or_nothing(self.remedy, answers)
         longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
         return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
 
 
 def first(rows: tuple[Row[A, T], ...], answers: A, thresholds: T) -> Decision:
-    """What the first row of a table says whose condition holds."""
-    return next(row for row in rows if row.holds(answers, thresholds)).decision(answers)
+    """What the first row of a table says whose condition holds, and whose numbers are known."""
+    for row in rows:
+        if row.holds(answers, thresholds):
+            with suppress(UnknownNumberError):
+                return row.decision(answers)
+    raise AssertionError(f"no row holds; the last one, {rows[-1].name!r}, has to hold always")

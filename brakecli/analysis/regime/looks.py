@@ -10,7 +10,7 @@ LOOKS: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "few cycles",
         lambda a, t: not a.cycles or a.cycles < (1.0 if a.settled else _UNSETTLED) * t.fewest_cycles,
-        "but only {a.cycles:.0f} cycles in {a.seconds:.3g} s",
+        "but only {a.cycles:.0f} cycles[ in {a.seconds:.3g} s]",
         "run longer",
         longer=True,
     ),
@@ -75,7 +75,7 @@ LOOKS: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "irregular",
         lambda a, t: True,
-        "irregular: stick in {a.stick_cycles:.0%} of the cycles, {a.lines}",
+        "irregular[: stick in {a.stick_cycles:.0%} of the cycles][, {a.lines}]",
         "run longer, or look at the spectrum",
         longer=True,
     ),

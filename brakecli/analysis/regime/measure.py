@@ -85,6 +85,16 @@ class Shown:
         return theory if slides or theory.stays(self.end[1]) else None
 
     @property
+    def brief(self) -> bool:
+        """Whether it fails, changes or is too short, so that little is asked of it."""
+        return self.samples < FEWEST_SAMPLES or not self.context.steady or bool(self.given.failure)
+
+    @property
+    def enough(self) -> bool:
+        """Whether all is known that is asked of it: more than a linear motion needs works and events."""
+        return self.track is not UNTRACKED or self.brief or self.linear is not None
+
+    @property
     def end(self) -> tuple[float, np.ndarray]:
         """Time and state of the last sample."""
         last = self.samples - 1
@@ -142,12 +152,11 @@ def answers(shown: Shown) -> Answers:
     """The record of answers; what the motion comes to is asked only where a row may need it."""
     context, seen, (exponent, failure) = shown.context, shown.seen, (shown.given.exponent, shown.given.failure)
     stands, waves = context.belt_speed == 0.0, bool(context.forced)
-    few = shown.samples < FEWEST_SAMPLES
     found: dict[str, Any] = {
         "failure": failure,
         "duration": shown.duration,
         "samples": shown.samples,
-        "few_samples": few,
+        "few_samples": shown.samples < FEWEST_SAMPLES,
         "steady": context.steady,
         "stands": stands,
         "waves": waves,
@@ -162,7 +171,7 @@ def answers(shown: Shown) -> Answers:
     }
     if exponent is not None:
         found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))
-    if few or not context.steady or failure:
+    if shown.brief:
         return Answers(**found)
     found |= {
         "moves": seen.largest_level > context.quiet,

@@ -170,7 +170,7 @@ ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
     Row(
         "lines",
         lambda a, t: True,
-        "sustained without stick: {a.line_share:.0%} of the energy in at most three lines{a.unseen}",
+        "sustained without stick[: {a.line_share:.0%} of the energy in at most three lines]{a.unseen}",
         "",
         Regime.QUASI_HARMONIC,
     ),

@@ -165,7 +165,7 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "lasts",
         lambda a, t: a.without_waves == Fate.LASTS and same(a, t),
-        "the vibration lasts: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m",
+        "the vibration lasts[: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m]",
         "",
         *_OWN,
     ),
@@ -187,7 +187,7 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "undecided",
         lambda a, t: True,
-        "the level {a.word} by e^{a.change:.2g} in the second half, and what it comes to is not known",
+        "[the level {a.word} by e^{a.change:.2g} in the second half, and ]what it comes to is not known",
         "run at least {a.longer:.3g} s",
         longer=True,
     ),
@@ -212,7 +212,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "linear, open",
         lambda a, t: a.linear,
-        _LINEAR + ": neighbours neither come together nor part surely, at {a.even:.2g} ± {a.even_error:.1g} 1/s",
+        _LINEAR + ": neighbours neither come together nor part surely[, at {a.even:.2g} ± {a.even_error:.1g} 1/s]",
         "run longer; without dashpots, " + _DASHPOT,
         longer=True,
     ),
@@ -325,9 +325,9 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "either",
         lambda a, t: True,
-        "friction and the roughness may both keep the vibration up: of its power friction gives "
-        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; neighbours change at "
-        "{a.exponent:.2g} 1/s; without the roughness it {a.without_waves}",
+        "friction and the roughness may both keep the vibration up[: of its power friction gives "
+        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W][; neighbours change at "
+        "{a.exponent:.2g} 1/s]; without the roughness it {a.without_waves}",
         longer=True,
     ),
 )
