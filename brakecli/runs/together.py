@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -61,10 +61,13 @@ def loops(systems: Sequence[System]) -> int:
     return sum(math.ceil(number / LANES) for key, number in alike.items() if key is not None)
 
 
-def certify_together(systems: Sequence[System]) -> list[Certified | None]:
+def certify_together(
+    systems: Sequence[System], suffices: Callable[[Motion], bool] = lambda motion: True
+) -> list[Certified | None]:
     """What `certify` finds for each system, with runs that are made and refined side by side.
 
-    None where that is not certain, or cannot be computed in a lane: such a system has to be certified alone.
+    None where that is not certain, cannot be computed in a lane, or where a motion in a lane does not suffice:
+    such a system has to be certified alone.
     """
     found: list[Certified | None] = [None] * len(systems)
     runs = {i: _runs(system) for i, system in enumerate(systems) if begins_with_steps(system)}
@@ -90,6 +93,6 @@ def certify_together(systems: Sequence[System]) -> list[Certified | None]:
         with np.errstate(all="ignore"):  # of a lane, which is left then
             motions = at_once([*map(fits, ready)], side_by_side)
         for i, motion in zip(places, motions, strict=True):
-            if motion is not None:
+            if motion is not None and suffices(motion):
                 go_on(i, motion)
     return found

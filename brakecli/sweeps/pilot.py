@@ -24,7 +24,7 @@ from brakecli.solver.system import MOST_STEPS
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.point import FAULTS, Begun, begun, computed, followed
-from brakecli.sweeps.simulate import judged, judged_together
+from brakecli.sweeps.simulate import judged, judged_together, may_suffice
 
 SECONDS = 1.0
 """Processor time (s) after which no further place is drawn. Other programs do not change it."""
@@ -135,7 +135,7 @@ class Pilot:
         self.guess = max([self.guess, *(each.check.seconds for each in ready)])
         begin = process_time()
         with within_range():
-            certified = certify_together(systems)
+            certified = certify_together(systems, may_suffice)
         climbed = (process_time() - begin) / max(loops(systems), 1) * task_loops / max(len(others), 1)
         begin, alone = process_time(), list[Begun]()
         with within_range():

@@ -23,7 +23,7 @@ from brakecli.solver.roughness import TWO_PI, turned
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.plan import Plan, Settings
 from brakecli.sweeps.record import Status, blank, filled, record_type
-from brakecli.sweeps.simulate import PointRun, checked, judged, judged_together
+from brakecli.sweeps.simulate import PointRun, checked, judged, judged_together, may_suffice
 
 OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
 FAULTS = (BrakecliError, FloatingPointError, MemoryError)
@@ -43,7 +43,7 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         ready = [each for each in points if isinstance(each, Begun)]
         systems = [each.check.system for each in ready]
         with within_range():
-            found = judged_together(systems, certify_together(systems))
+            found = judged_together(systems, certify_together(systems, may_suffice))
         known = dict(zip(map(id, ready), found, strict=True))
         for place, each in enumerate(points, start - first):
             record, _ = computed(plan, each, *known.get(id(each), ()))

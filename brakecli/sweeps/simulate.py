@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brakecli.analysis.regime.classify import classify, look, verdicts
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, Part, last_quarter
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory, theories_of
 from brakecli.case.case import Case
@@ -17,6 +18,7 @@ from brakecli.runs.judge import asked, in_memory, motion_of
 from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.settled import Judged, settled
 from brakecli.solver.alike import at_once
+from brakecli.solver.history import array_history
 from brakecli.solver.motion import Motion
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Ending, early
@@ -81,6 +83,16 @@ def judged(
     status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
     first = next(iter(warnings), "")
     return PointRun(verdict, case, motion, certificate, status, reason, first, len(warnings))
+
+
+def may_suffice(motion: Motion) -> bool:
+    """Whether a motion in a lane may show all that is asked of it, however coarse it is.
+
+    Where the pad opens to the last, it is not linear: `judged_together` would have it computed alone.
+    """
+    samples = len(motion.rows)
+    quarter = Part(array_history(motion.system.interval, motion.rows), last_quarter(samples), samples)
+    return samples < FEWEST_SAMPLES or quarter.touches()
 
 
 def judged_together(

@@ -24,7 +24,7 @@ from brakecli.solver.history import array_history
 from brakecli.solver.method import Method
 from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.simulate import checked, judged, judged_together, simulate
+from brakecli.sweeps.simulate import checked, judged, judged_together, may_suffice, simulate
 from brakecli.sweeps.workers.task import compute_units
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
@@ -99,7 +99,7 @@ def say_the_same(cases: list[Case]) -> int:
     """
     known = [checked(case) for case in cases]
     systems, lanes = [each.system for each in known], 0
-    found = judged_together(systems, certify_together(systems))
+    found = judged_together(systems, certify_together(systems, may_suffice))
     for case, each, (by_lanes, theory) in zip(cases, known, found, strict=True):
         point, run = judged(case, each, by_lanes, theory, whole=False), simulate(case)
         one, other = point.verdict, run.verdict
@@ -122,7 +122,10 @@ def test_a_point_whose_pad_opens_says_what_a_run_of_it_says(name: str, every: in
         tables = {**found["case"], "friction": {"coefficient": friction}}
         tables["wheel"] = {**tables["wheel"], "angular_speed": speed}
         cases.append(make(tables))
-    assert say_the_same(cases[::every]) == 0
+    chosen = cases[::every]
+    assert say_the_same(chosen) == 0
+    lanes = certify_together([checked(case).system for case in chosen], may_suffice)
+    assert lanes == [None] * len(chosen)  # none has been refined for nothing
 
 
 @pytest.mark.parametrize("shoes", counts(8, 200))

@@ -33,6 +33,11 @@ def tenths(samples: int) -> tuple[int, int]:
     return -(-samples // 10), samples - -(-samples // 10)
 
 
+def last_quarter(samples: int) -> int:
+    """The sample that begins the last quarter of so many."""
+    return samples * (WINDOWS - LAST) // WINDOWS
+
+
 @dataclass(frozen=True)
 class Part:
     """The samples start … stop - 1 of a history, read in pieces that fit into memory.

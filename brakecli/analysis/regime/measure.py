@@ -11,7 +11,7 @@ from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LAST, LONGEST, WINDOWS, Part, windowed
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, Part, last_quarter, windowed
 from brakecli.analysis.regime.seen import Seen
 from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.stability.linear import Linear
@@ -54,7 +54,7 @@ class Shown:
         self.seen, self.limits, self.track = seen, limits, given.track
         self.samples, self.interval = self.history.samples, self.history.interval
         self.duration = self.samples * self.interval
-        self.half, self.quarter = self.samples // 2, self.samples * (WINDOWS - LAST) // WINDOWS
+        self.half, self.quarter = self.samples // 2, last_quarter(self.samples)
         self.judged_from = seen.settled_from or self.half
 
     def part(self, start: int) -> Part:

@@ -16,6 +16,7 @@ from brakecli.analysis.regime.evidence import (
     LONGEST,
     WINDOWS,
     Part,
+    last_quarter,
     level_change,
     tenths,
 )
@@ -59,7 +60,7 @@ def _columns(history: History, within: float) -> list[NDArray[Any]]:
     samples = history.samples
     (first, last), whole = tenths(samples), Part(history, 0, samples)
     state = history.read("state", samples - 1, samples)
-    quarter = Part(history, samples * (WINDOWS - LAST) // WINDOWS, samples)
+    quarter = Part(history, last_quarter(samples), samples)
     parts = Part(history, 0, first), Part(history, last, samples), Part(history, samples // 2, samples), quarter
     columns = [
         state[:, 0],
