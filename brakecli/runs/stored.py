@@ -46,7 +46,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         changing = over_time(run.history, system) if not failure and not system.steady else None
         shown = {each.name: run.attributes.get(each.name) for each in fields.EXPONENT}
         shown |= {"failure": failure, "vibrations": fields.VIBRATIONS.read({"over_time": changing})}
-        if "row" not in evidence:
+        if _older(evidence):
             found = check(system)
             if failure is None and found.seconds <= MOST_SECONDS:
                 motion, _ = motion_of(asked(system))
@@ -70,6 +70,11 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
             "thresholds": plain(thresholds),
         }
     )
+
+
+def _older(evidence: Mapping[str, Any]) -> bool:
+    """Whether a record lacks answers that rows ask for: all of them, or what powers leave open."""
+    return "row" not in evidence or ("power_of_friction" in evidence and "power_left" not in evidence)
 
 
 @contextmanager

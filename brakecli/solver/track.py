@@ -99,19 +99,21 @@ class Track:
         names = ("power_belt", "power_friction", "power_dashpots", "power_load")
         return dict(zip(names, means, strict=True)) | {"power_rest": means[0] - sum(means[1:])}
 
-    def given(self, begin: float, force: float) -> tuple[Floats, float]:
-        """What friction and the roughness give to a vibration in each part from a time (s) on (W, two columns).
+    def given(self, begin: float, force: float) -> Floats:
+        """What is given to a vibration in each part from a time (s) on, in columns; NaN without any part.
 
-        What the mean of the friction force F_x (N) does is none of the vibration's. Also what does not add up (W).
-        NaN without any part.
+        What friction gives (J), what the roughness gives, what dashpots and scheme leave of both, and how long the
+        part is (s): marks lie at the ends of steps, so that parts are not alike, and no mean of their powers is
+        that of the motion. What the mean of the friction force F_x (N) does is none of the vibration's.
         """
         if len(self.times) < 2:
-            return np.full((1, 2), math.nan), math.nan
+            return np.full((1, 4), math.nan)
         first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
-        works, moved = np.diff(self.works[first:], axis=0), np.diff(self.places[first:])
-        found = np.column_stack([works[:, 0] - works[:, 1] - force * moved, works[:, 4]])
-        spans = np.diff(self.times[first:])[:, None]
-        return found / spans, self.powers(begin, float(self.times[-1])).closing
+        works = np.diff(self.works[first:], axis=0)
+        friction = works[:, 0] - works[:, 1] - force * np.diff(self.places[first:])
+        roughness = works[:, 4]
+        left = friction + roughness - works[:, 2] - works[:, 5]
+        return np.column_stack([friction, roughness, left, np.diff(self.times[first:])])
 
 
 _NONE = np.zeros(0)

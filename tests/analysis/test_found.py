@@ -13,6 +13,7 @@ from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
+from brakecli.runs import judge
 from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from tests.analysis.found import SHOES
@@ -26,6 +27,13 @@ def judged(name: str, times: float = 1.0, **changes: Any) -> Verdict:
     """The verdict on a shoe, run for so many times as long."""
     tables = SHOES[name]
     return verdict_of(make(tables, solver__duration=times * tables["solver"]["duration"], **changes))
+
+
+def judged_to_its_tolerance(name: str, times: float = 1.0) -> Verdict:
+    """The same of a shoe whose case gives a tolerance in place of a step."""
+    tables = SHOES[name]
+    case = make(tables, solver__duration=times * tables["solver"]["duration"])
+    return judge.judged_in_memory(judge.asked(system_of(case)), lambda steps: None).verdict
 
 
 def test_a_shoe_that_locks_itself_is_not_called_forced_while_it_drifts_away() -> None:
@@ -547,3 +555,33 @@ def test_a_reason_says_no_more_than_is_known(name: str, says: str, not_this: str
     reasons = " ".join(judged(name).reasons)
     assert re.search(says, reasons)
     assert not_this is None or not_this not in reasons
+
+
+@pytest.mark.parametrize(
+    ("name", "regime"),
+    [
+        ("marks at the ends of steps, fed by friction", Regime.RELAXATION),
+        ("marks at the ends of steps, fifteen cycles", Regime.QUASI_HARMONIC),
+    ],
+)
+def test_what_friction_feeds_is_not_called_forced_as_steps_end_at_its_events(name: str, regime: Regime) -> None:
+    """Friction and roughness feed the dashpots, whose power has no sign that could be wrong.
+
+    Runs of 2, 4 and 12 times the length say the first of the first, and of the second that friction gives 0.22 mW
+    and the dashpots take 0.21 mW.
+    """
+    verdict = judged_to_its_tolerance(name)
+    assert (verdict.regime, verdict.excitation) == (regime, Excitation.SELF_EXCITED)
+    found = verdict.evidence
+    given, left = found["power_of_friction"] + found["power_of_roughness"], found["power_left"]
+    assert given == pytest.approx(found["power_dashpots"] + left, abs=0.02 * found["power_dashpots"])
+    error = math.hypot(found["friction_error"], found["roughness_error"])
+    assert abs(left) <= 3.0 * error
+
+
+@pytest.mark.parametrize("times", [1.0, pytest.param(12.0, marks=campaign)])
+def test_what_may_come_together_has_no_phase_of_its_own(times: float) -> None:
+    """Three very different starts become one motion, at another level of vx than without the waves."""
+    verdict = judged_to_its_tolerance("comes together more slowly than is sure", times)
+    assert verdict.excitation is (Excitation.NONE if times == 1.0 else Excitation.FORCED)
+    assert times > 1.0 or "run at least" in verdict.reasons[0]

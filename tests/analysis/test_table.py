@@ -23,6 +23,7 @@ LASTS: dict[str, Any] = {"without_waves": Fate.LASTS, "amplitude_without_waves":
 SHAKEN: dict[str, Any] = {
     "waves": True, "slowest": 1.0, "exponent": 0.0, "exponent_error": 0.01, "even": 0.0, "even_error": 0.01,
     "power_of_friction": 1.0, "friction_error": 0.1, "power_of_roughness": 0.1, "roughness_error": 0.1,
+    "power_left": 0.0,
 }  # fmt: skip
 FADING: dict[str, Any] = {**SHAKEN, "exponent": -1.0}
 SMOOTH_ROWS: dict[str, dict[str, Any]] = {
@@ -67,7 +68,7 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "bounces": {"touches": False},
     "forced, neighbours": {**FADING, "without_waves": Fate.DIES, "change": 0.5},
     "forced, level": {"without_waves": Fate.DIES, "change": -0.5, "power_of_friction": 0.1},
-    "forced, friction takes": {"power_of_friction": -1.0},
+    "forced, friction takes": {"power_of_friction": -1.0, "power_of_roughness": 2.0},
     "forced, roughness gives": {**FADING, "power_of_roughness": 3.0},
     "forced, another level": {**FADING, **LASTS, "level_without_waves": 2.0},
     "dies out, not yet": {"without_waves": Fate.DIES, "change": 0.5},
@@ -75,7 +76,10 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "self-excited: quasi-harmonic": LASTS,
     "locked to the waves: quasi-harmonic": {**FADING, **LASTS},
     "comes and goes": {"change": math.nan, "change_error": math.nan},
+    "kept up by friction: quasi-harmonic": {**LASTS, "exponent": -0.1},
     "still changes": {"change": 0.5},
+    "open account": {"power_left": 1.0},
+    "phase not known": {"exponent": -0.1},
     "either": {},
 }
 LOOK_ROWS: dict[str, dict[str, Any]] = {
@@ -90,6 +94,14 @@ LOOK_ROWS: dict[str, dict[str, Any]] = {
     "quasi-harmonic": {},
     "irregular": {"stick_cycles": 0.5},
 }
+POWERS = (
+    "forced, level",
+    "forced, friction takes",
+    "forced, roughness gives",
+    "self-excited: quasi-harmonic",
+    "locked to the waves: quasi-harmonic",
+    "kept up by friction: quasi-harmonic",
+)
 FORCED = Regime.DAMPED, Excitation.FORCED
 
 
@@ -149,7 +161,7 @@ def test_no_sentence_has_a_number_that_is_not_known() -> None:
         ("settled_within", 0.3, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
         ("sure_errors", 60.0, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
         ("same_level", 0.6, {**LASTS, "level_without_waves": 2.0}, ("on its way", "lasts")),
-        ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
+        ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "kept up by friction")),
         ("most", 20.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
         ("fewest_cycles", 200.0, LASTS, ("quasi-harmonic", "few cycles")),
         ("samples_per_cycle", 30.0, LASTS, ("quasi-harmonic", "few samples in a cycle")),
@@ -185,13 +197,50 @@ def test_what_still_grows_on_a_rough_wheel_looks_as_the_limit_cycle_to_which_it_
 @pytest.mark.parametrize(
     "changes",
     [
-        {**LASTS, "exponent": -0.08},  # neighbours come together, but by less than a power of e
+        {**LASTS, "exponent": -0.08, "power_of_roughness": 1.0},  # together, but by less than a power of e
         {**LASTS, "level_without_waves": 2.0},  # sliding is stable, and may be what the waves shake
         {"without_waves": Fate.DIES},  # and yet friction keeps it up, with a phase of its own
     ],
 )
 def test_what_shows_neither_a_phase_of_its_own_nor_that_waves_lead_is_undecided(changes: dict[str, Any]) -> None:
-    assert decide(answers(**{**SHAKEN, **changes}), LIMITS).row == "either"
+    assert decide(answers(**{**SHAKEN, **changes}), LIMITS).row in ("phase not known", "either")
+
+
+@pytest.mark.parametrize(
+    ("changes", "row"),
+    [
+        (
+            {"exponent": -0.04, "exponent_error": 0.02},
+            "self-excited",
+        ),  # 0 within its errors, and never a power of e
+        (
+            {"exponent": -0.7, "exponent_error": 0.4},
+            "phase not known",
+        ),  # no proof that they come together, nor that not
+        ({"exponent": 0.3, "exponent_error": 0.4}, "phase not known"),
+        ({"exponent": 0.3, "exponent_error": 0.05}, "self-excited"),  # chaos
+        ({"exponent": 0.0, "exponent_error": math.inf}, "either"),
+        ({"exponent": math.nan, "exponent_error": math.nan}, "either"),
+        ({"exponent": -0.7, "exponent_error": 0.4, "even": -0.8, "even_error": 0.05}, "forced, roughness gives"),
+        ({"exponent": -0.7, "exponent_error": 0.1, "even": -0.1, "even_error": 0.01}, "forced, roughness gives"),
+    ],
+)
+def test_what_is_not_known_of_neighbours_is_no_evidence(changes: dict[str, Any], row: str) -> None:
+    """Friction gives 1 W and the roughness as much, so that powers decide nothing; or three times as much."""
+    power = 3.0 if row.startswith("forced") else 1.0
+    found = decide(
+        answers(**{**SHAKEN, **LASTS, "power_of_roughness": power, "even": math.nan, **changes}), LIMITS
+    )
+    assert found.row.partition(":")[0] == row
+    assert not {"nan", "inf"} & set(found.sentence.replace(";", " ").split())
+
+
+@pytest.mark.parametrize("left", [3.0, -3.0, math.nan, math.inf])
+@pytest.mark.parametrize("row", POWERS)
+def test_no_row_rests_on_powers_that_do_not_balance(row: str, left: float) -> None:
+    """What friction and the roughness give, dashpots take: what is left is as large as both."""
+    given = answers(**{**SHAKEN, **ROUGH_ROWS[row], "change": 0.0, "power_left": left})
+    assert decide(given, LIMITS).regime is Regime.UNDECIDED
 
 
 def test_no_threshold_is_left_out_and_there_are_no_more_than_twelve() -> None:

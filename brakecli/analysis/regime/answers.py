@@ -10,6 +10,8 @@ from brakecli.analysis.regime.decision import told
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 FADED = 3.0  # powers of e after which a change has ended: 5 % of it are left
+_TOLD = 3.0  # errors of an exponent beyond which it is told from 0
+_TWICE, _MOST_TIMES = 2.0, 16.0  # times as long: the least and the most that is asked for; choices
 _SETTLED = 1.4  # a run over its settled part, where it is told how long it has to be; a choice
 
 
@@ -70,6 +72,7 @@ class Answers(NamedTuple):
     sticks_without_waves: float = math.nan  # in a period
     power_of_friction: float = math.nan  # power that friction gives, W
     power_of_roughness: float = math.nan  # that the roughness gives
+    power_left: float = math.nan  # what dashpots and scheme leave of both; nothing where the motion has settled
     friction_error: float = math.nan
     roughness_error: float = math.nan
     seconds: float = math.nan  # of the settled part
@@ -131,6 +134,23 @@ class Answers(NamedTuple):
     def waited(self) -> float:
         """Duration after which neighbours have come together."""
         return shown_after(self.duration, abs(self.exponent))
+
+    @property
+    def told_apart(self) -> float:
+        """Duration after which an exponent is told from 0, as its error falls with the square root of the time."""
+        times = (_TOLD * self.exponent_error / max(abs(self.exponent), 1e-300)) ** 2
+        return QUARTER * self.duration * min(max(times, _TWICE), _MOST_TIMES)
+
+    @property
+    def becomes(self) -> str:
+        """What becomes of the vibration on the smooth wheel."""
+        known = self.without_waves is not Fate.UNKNOWN
+        return f"it {self.without_waves}" if known else "it is not known what it comes to"
+
+    @property
+    def taken(self) -> float:
+        """Power (W) that friction takes."""
+        return -self.power_of_friction
 
     @property
     def decay(self) -> float:

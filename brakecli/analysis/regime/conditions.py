@@ -11,14 +11,31 @@ def steady(a: Answers, t: Thresholds) -> bool:
     return abs(a.change) <= max(t.sure_errors * a.change_error, 2.0 * t.settled_within)
 
 
+def _neighbours(a: Answers, t: Thresholds) -> tuple[float, float]:
+    """Powers of e by which neighbours change in half of the run, with `sure_errors` of their error.
+
+    A line through the logarithms knows them better where they swing, and worse where they wander: it counts where
+    the growth itself lies within its error of it.
+    """
+    rate, error = a.exponent, a.exponent_error
+    if math.isfinite(error) and a.even_error < error and abs(a.even - rate) <= error:
+        rate, error = a.even, a.even_error
+    return a.powers(rate), t.sure_errors * a.powers(error)
+
+
 def together(a: Answers, t: Thresholds) -> bool:
     """Neighbours of the motion come together."""
-    return a.powers(a.exponent) < -max(t.comes_together, t.sure_errors * a.powers(a.exponent_error))
+    powers, error = _neighbours(a, t)
+    return powers < -max(t.comes_together, error)
 
 
 def apart(a: Answers, t: Thresholds) -> bool:
-    """Nothing shows that neighbours come together, however slowly: the motion may have a phase of its own."""
-    return a.exponent >= -t.sure_errors * a.exponent_error
+    """Neighbours do not come together: the motion has a phase of its own.
+
+    That they do so is excluded by more than `comes_together`; the exponent of a quasi-periodic motion is 0.
+    """
+    powers, error = _neighbours(a, t)
+    return powers >= -error and powers - error > -t.comes_together
 
 
 def same(a: Answers, t: Thresholds) -> bool:
@@ -37,30 +54,55 @@ def comes_to_it(a: Answers, t: Thresholds) -> bool:
 
 
 def gives(a: Answers, t: Thresholds) -> bool:
-    """Friction surely gives energy."""
-    return a.power_of_friction > t.sure_errors * a.friction_error
+    """Friction surely gives energy, though what the account leaves open were its own.
+
+    A level that grows stores energy, which leaves nothing open.
+    """
+    left = max(a.power_left, 0.0) if steady(a, t) else 0.0
+    return a.power_of_friction - left > t.sure_errors * a.friction_error
+
+
+def takes(a: Answers, t: Thresholds) -> bool:
+    """Friction surely takes energy, though what the account leaves open were its own."""
+    return a.power_of_friction - min(a.power_left, 0.0) < -t.sure_errors * a.friction_error
 
 
 def friction_gives_most(a: Answers, t: Thresholds) -> bool:
-    """Friction gives most of the energy."""
-    error = math.hypot(a.friction_error, t.most * a.roughness_error)
-    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) > t.sure_errors * error
+    """Friction gives most of the energy, whoever gives what the account leaves open."""
+    error = t.sure_errors * math.hypot(a.friction_error, t.most * a.roughness_error) + _unbalanced(a, t)
+    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) > error
+
+
+def friction_gives_less(a: Answers, t: Thresholds) -> bool:
+    """Nothing shows that friction gives most of the energy, by an account that balances."""
+    error = t.sure_errors * math.hypot(a.friction_error, t.most * a.roughness_error)
+    return balances(a, t) and a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) <= error
 
 
 def roughness_gives_most(a: Answers, t: Thresholds) -> bool:
-    """The waves give most of the energy."""
-    error = math.hypot(a.roughness_error, t.most * a.friction_error)
-    return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > t.sure_errors * error
+    """The waves give most of the energy, whoever gives what the account leaves open."""
+    error = t.sure_errors * math.hypot(a.roughness_error, t.most * a.friction_error) + _unbalanced(a, t)
+    return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > error
+
+
+def _unbalanced(a: Answers, t: Thresholds) -> float:
+    """Power (W) by which what is left open may change what the larger power has before `most` times the other."""
+    return max(a.power_left, -t.most * a.power_left)
+
+
+def balances(a: Answers, t: Thresholds) -> bool:
+    """Dashpots and scheme take what friction and the roughness give, within its error, or the level changes.
+
+    A level that is called settled may change by a part of itself, and what is stored with it.
+    """
+    error = t.sure_errors * math.hypot(a.friction_error, a.roughness_error)
+    drift = t.settled_within * max(abs(a.power_of_friction), abs(a.power_of_roughness))
+    return abs(a.power_left) <= max(error, drift) or (not steady(a, t) and math.isfinite(a.power_left))
 
 
 def regular(a: Answers, t: Thresholds) -> bool:
     """The energy is on one line and its multiples, or in few narrow bands."""
     return a.harmonic_share >= t.harmonic_share or a.band_share >= t.band_share
-
-
-def takes(a: Answers, t: Thresholds) -> bool:
-    """Friction surely takes energy."""
-    return a.power_of_friction < -t.sure_errors * a.friction_error
 
 
 def decays(a: Answers, t: Thresholds) -> bool:

@@ -131,13 +131,23 @@ class Shown:
         return float(np.abs(sizes / np.maximum([self.seen.level, self.seen.amplitude], 1e-300) - 1.0).max())
 
     def powers(self) -> dict[str, float]:
-        """Powers (W) that friction and the roughness give, with their errors, by the loop's account."""
-        given, open_by = self.track.given(self.judged_from * self.interval, self.judged.mean("friction_force"))
-        means = windowed(given)
-        (friction, roughness), (off, off_too) = means.mean(axis=0).tolist(), (means.std(axis=0) / 2.0).tolist()
-        found = {"power_of_friction": friction, "power_of_roughness": roughness}
-        errors = {"friction_error": max(off, abs(open_by)), "roughness_error": max(off_too, abs(open_by))}
-        return found | errors
+        """Powers (W) that friction and the roughness give, with their errors, by the loop's account.
+
+        What dashpots and scheme leave of both is nothing where the motion has settled.
+        """
+        begin = self.judged_from * self.interval
+        given = windowed(self.track.given(begin, self.judged.mean("friction_force")))
+        powers = given[:, :3] / given[:, 3:]
+        friction, roughness, left = powers.mean(axis=0).tolist()
+        friction_error, roughness_error, _ = (powers.std(axis=0) / 2.0).tolist()
+        closing = abs(self.track.powers(begin, self.duration).closing)
+        return {
+            "power_of_friction": friction,
+            "power_of_roughness": roughness,
+            "power_left": left,
+            "friction_error": max(friction_error, closing),
+            "roughness_error": max(roughness_error, closing),
+        }
 
 
 @lru_cache(maxsize=4)  # the points of a sweep ask for the same ones

@@ -10,7 +10,9 @@ from brakecli.analysis.regime.answers import Answers, Fate
 from brakecli.analysis.regime.conditions import (
     another,
     apart,
+    balances,
     decays,
+    friction_gives_less,
     friction_gives_most,
     gives,
     grows,
@@ -28,6 +30,10 @@ _OWN = Regime.UNDECIDED, Excitation.SELF_EXCITED  # how it looks, `LOOKS` decide
 _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
+_SOURCES = (
+    "[of its power friction gives {a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; ]"
+    "[neighbours change at {a.exponent:.2g} 1/s; ]without the roughness {a.becomes}"
+)
 _DECAYS = _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)"
 
 CONTACT: tuple[Row[Answers, Thresholds], ...] = (
@@ -243,7 +249,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         lambda a, t: (
             a.without_waves == Fate.DIES
             and (steady(a, t) or a.change < 0.0)
-            and not friction_gives_most(a, t)
+            and friction_gives_less(a, t)
             and not a.undamped
         ),
         "only the roughness shakes the shoe: without it the vibration dies out, and its level does not grow",
@@ -252,8 +258,14 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "forced, friction takes",
-        lambda a, t: takes(a, t) and (steady(a, t) or a.without_waves == Fate.DIES) and not a.undamped,
-        "only the roughness shakes the shoe: friction takes {a.power_of_friction:.2g} W from the vibration",
+        lambda a, t: (
+            takes(a, t)
+            and roughness_gives_most(a, t)
+            and (steady(a, t) or a.without_waves == Fate.DIES)
+            and not a.undamped
+        ),
+        "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, and friction takes "
+        "{a.taken:.2g} W from the vibration",
         "",
         *_FORCED,
     ),
@@ -314,6 +326,20 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "",
         *_OWN,
     ),
+    Row(
+        "kept up by friction",
+        lambda a, t: (
+            a.without_waves == Fate.LASTS
+            and steady(a, t)
+            and same(a, t)
+            and friction_gives_most(a, t)
+            and not a.undamped
+        ),
+        "the vibration lasts without the roughness at the same level, and of its power friction gives "
+        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W",
+        "",
+        *_OWN,
+    ),
     COMES_AND_GOES,
     Row(
         "still changes",
@@ -323,11 +349,25 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         longer=True,
     ),
     Row(
+        "open account",
+        lambda a, t: math.isfinite(a.power_left) and not balances(a, t),
+        "friction gives {a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W, "
+        "{a.power_left:.2g} W more than dashpots take, though the level stays: this account says nothing",
+        "run longer, or to a smaller solver.tolerance",
+        longer=True,
+    ),
+    Row(
+        "phase not known",
+        lambda a, t: math.isfinite(a.exponent_error) and not (together(a, t) or apart(a, t)),
+        "it is not certain whether neighbours come together: they change at {a.exponent:.2g} ± "
+        "{a.exponent_error:.1g} 1/s; " + _SOURCES,
+        "run at least {a.told_apart:.3g} s",
+        longer=True,
+    ),
+    Row(
         "either",
         lambda a, t: True,
-        "friction and the roughness may both keep the vibration up[: of its power friction gives "
-        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W][; neighbours change at "
-        "{a.exponent:.2g} 1/s]; without the roughness it {a.without_waves}",
+        "friction and the roughness may both keep the vibration up: " + _SOURCES,
         longer=True,
     ),
 )
