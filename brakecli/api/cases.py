@@ -77,7 +77,7 @@ def stability(
         vary: one key, or several that take the same value, with values that rise or fall, as
             `{"friction.coefficient": np.linspace(0, 1, 101)}`: follows both modes along them. A range is written
             as in a sweep: `{"friction.coefficient": {"start": 0, "stop": 1, "num": 101}}`.
-        pushes: how many at each of five values seek vibrations that no branch from flutter reaches.
+        pushes: five times as many seek vibrations that no branch from flutter reaches; 0 for none.
         progress: as for `run`.
 
     Returns:
@@ -141,7 +141,7 @@ def branch(
         start: what `run` gave, or the path of a result, whose end comes to a motion that is followed, too; or a
             list of them.
         switch: also follow the motions of twice the period from each flip.
-        pushes: how many at each of five values seek vibrations that none of these branches reaches.
+        pushes: five times as many seek vibrations that none of these branches reaches; 0 for none.
         output: a result file to keep; none if left out.
         progress: as for `run`.
         force: replace that file if it exists.

@@ -15,7 +15,7 @@ from brakecli.branches.begin import settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.follow import Stop, both_ways, follow
 from brakecli.branches.forced import MOST_PERIODS, Forced
-from brakecli.branches.islands import Search, places, tried
+from brakecli.branches.islands import PARTS, Search, places, tried
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Point
@@ -91,7 +91,7 @@ class Explorer:
     ) -> Explored:
         """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted.
 
-        On smooth pads vibrations beside these are sought by so many `pushes` at each of some values.
+        On smooth pads vibrations beside these are sought by five times so many `pushes`.
         """
         self.branches.append(slid(self.line, self.slides, self.changes))
         if not self.branches[0].points:
@@ -246,12 +246,11 @@ class Explorer:
         begun, search, budget = perf_counter(), self.search, self.points
         most = len(self.branches) + MOST_PUSHED
         own = None if self.line.own is None else self.line.place(self.line.own)
-        where = places(self.slides, self.changes, own)
-        for number, p in enumerate(where):
+        for p, first, count in places(self.slides, self.changes, own, pushes):
             if self.stop() or perf_counter() > self.end:
                 break
-            self.tell("pushes", number * pushes, len(where) * pushes)
-            ends = tried(self.line.shoe(p), number * pushes, pushes, self.stop)
+            self.tell("pushes", first, PARTS * pushes)
+            ends = tried(self.line.shoe(p), first, count, self.stop)
             search.pushes += ends.pushes
             search.undecided += ends.undecided
             for orbit in ends.orbits:

@@ -55,7 +55,7 @@ def thresholds(
 ) -> Thresholds:
     """Both thresholds of a case along friction, by the limit cycles that begin where sliding flutters.
 
-    Vibrations to which none of these branches leads are sought by so many `pushes` at each of some values.
+    Vibrations to which none of these branches leads are sought by five times so many `pushes`.
     On smooth pads alone: rough ones take seconds to a minute, and `brakecli branch` follows these.
     """
     lost = report.critical

@@ -28,7 +28,7 @@ def output_option(content: str, default: str) -> Any:
 CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
 SET = "KEY.PATH=VALUE", "--set"
 Overrides = Annotated[list[str] | None, option("Set a key of the case, the value in TOML; repeatable.", *SET)]
-PUSHED = "Pushes at each of five values that seek further vibrations; 0 for none."
+PUSHED = "Five times as many pushes seek further vibrations; 0 for none."
 Pushes = Annotated[int, option(PUSHED, "N", min=0, max=MOST_PUSHES)]
 AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
 

@@ -91,7 +91,7 @@ def branch(
     switch: bool = False,
     pushes: int = 0,
 ) -> Answers:
-    """Follow all branches of a line, and those that so many `pushes` at each of some values come to.
+    """Follow all branches of a line, and those that five times so many `pushes` come to.
 
     `stop` ends the work and keeps what there is.
     """
