@@ -7,7 +7,8 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from brakecli.api.calls import as_files, interruptible, readings_told, target, telling_to, warn
-from brakecli.api.given import axis_of, case_of, ends_of, mapping, study_of
+from brakecli.api.given import axis_of, case_of, ends_of, mapping, pushes_of, study_of
+from brakecli.branches.pushes import PUSHES
 from brakecli.errors import BrakecliError, UsageError
 
 if TYPE_CHECKING:
@@ -65,6 +66,7 @@ def stability(
     settings: "Settings | None" = None,
     *,
     vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings] | None" = None,
+    pushes: int = PUSHES,
     progress: "Progress" = False,
 ) -> "xr.Dataset":
     """Critical friction, modes and growth of steady sliding, and from which friction on a vibration can exist.
@@ -75,6 +77,7 @@ def stability(
         vary: one key, or several that take the same value, with values that rise or fall, as
             `{"friction.coefficient": np.linspace(0, 1, 101)}`: follows both modes along them. A range is written
             as in a sweep: `{"friction.coefficient": {"start": 0, "stop": 1, "num": 101}}`.
+        pushes: five times as many seek vibrations that no branch from flutter reaches; 0 for none.
         progress: as for `run`.
 
     Returns:
@@ -100,7 +103,7 @@ def stability(
             with within_range():
                 system = system_of(loaded.case)
                 report = stability(system)
-                both = thresholds(loaded.case, system, report, tell)
+                both = thresholds(loaded.case, system, report, tell, pushes_of(pushes))
             numbers = values_of(STABILITY, report) | values_of(THRESHOLDS, both)
             return dataset((*STABILITY, *THRESHOLDS), numbers)
         from brakecli.sweeps.lock_in import lock_in, write
@@ -118,6 +121,7 @@ def branch(
     parameter: "Mapping[str | tuple[str, ...], tuple[float, float]]",
     start: "Result | Sequence[Result] | None" = None,
     switch: bool = False,
+    pushes: int = PUSHES,
     output: "str | PathLike[str] | None" = None,
     progress: "Progress" = False,
     force: bool = False,
@@ -137,6 +141,7 @@ def branch(
         start: what `run` gave, or the path of a result, whose end comes to a motion that is followed, too; or a
             list of them.
         switch: also follow the motions of twice the period from each flip.
+        pushes: five times as many seek vibrations that none of these branches reaches; 0 for none.
         output: a result file to keep; none if left out.
         progress: as for `run`.
         force: replace that file if it exists.
@@ -162,7 +167,7 @@ def branch(
         given: Iterable[Any] = start if isinstance(start, list | tuple) else [start] if start is not None else []
         with as_files(given, "start") as files:
             starts = [start_of(file, keys) for file in files]
-        found = branch(line, tell, lambda: False, starts, switch)
+        found = branch(line, tell, lambda: False, starts, switch, pushes_of(pushes))
         write(path, loaded, found, unit(keys[0]), force=force)
         return opened(path, own=True)
 

@@ -53,6 +53,15 @@ def study_of(source: Any, settings: "Settings | None" = None) -> "LoadedStudy":
     return source
 
 
+def pushes_of(number: int) -> int:
+    """A number of pushes; raises UsageError."""
+    from brakecli.branches.pushes import MOST_PUSHES
+
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number <= MOST_PUSHES:
+        raise UsageError(f"pushes {number}: is no whole number from 0 to {MOST_PUSHES}")
+    return number
+
+
 def overrides(settings: "Settings | None") -> list[str]:
     """Settings as `--set` has them; a table replaces the one that the case has."""
     return [f"{key}={_toml(value, key)}" for key, value in mapping(settings, "settings").items()]

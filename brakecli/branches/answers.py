@@ -12,7 +12,7 @@ from brakecli.branches.explore import Explored, crossing, span
 from brakecli.branches.follow import RUNS_AGAIN
 from brakecli.branches.line import Line
 from brakecli.branches.point import End, Point
-from brakecli.branches.sliding import Slide
+from brakecli.branches.sliding import Slide, stable_spans
 from brakecli.branches.stable_parts import CUT, NARROWEST, Part, Span, merged, stable_parts, told_apart, united
 from brakecli.branches.told import FORCED, SLIDING, Followed, Mark
 
@@ -146,14 +146,8 @@ class Answers:
         """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
         if self.bases:
             return united([part for each in self.bases for part in stable_parts(each)])
-        found, slides = list[Part](), self._slides
-        if not slides:
-            return found
-        changes = self.explored.changes
-        edges = [Bound(each.p, each.error) for each in changes]
-        edges = [Bound(slides[0].p)] * slides[0].stable + edges
-        edges += [Bound(slides[-1].p)] * (len(edges) % 2)
-        return [Part(low, high, 0.0) for low, high in zip(edges[::2], edges[1::2], strict=True) if high.p > low.p]
+        spans = stable_spans(self.explored.slides, self.explored.changes)
+        return [Part(Bound(*low), Bound(*high), 0.0) for low, high in spans]
 
     @cached_property
     def _edges(self) -> list[list[Bound]]:
@@ -221,7 +215,24 @@ class Answers:
                 f"at the case's {self.own:.4g} an unstable cycle of {metres(self.barrier)} lies between the two"
             )
         parts += [f"the branch is cut at {mark.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
-        return "; ".join([*parts, *self.explored.notes])
+        return "; ".join(filter(None, [*parts, *self.explored.notes, self.sought]))
+
+    @cached_property
+    def sought(self) -> str:
+        """What pushes have come to, in words; empty where there were none."""
+        search = self.explored.search
+        if not search.pushes:
+            return ""
+        lowest = [min(part.low.p for part in stable_parts(followed)) for followed in search.found]
+        values = " and ".join(f"{self.line.value(p):.4g}" for p in sorted(lowest))
+        how = f"found in {search.pushes} pushes"
+        if len(lowest) == 0:
+            words = f"no other vibration {how}"
+        elif len(lowest) == 1:
+            words = f"another vibration, {how}, exists from {values} on"
+        else:
+            words = f"{len(lowest)} other vibrations, {how}, exist from {values} on"
+        return f"{words}; what {search.undecided} of these come to is not known" if search.undecided else words
 
     def _self_excited(self) -> str:
         if self.range is None:

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import pairwise
 from time import perf_counter
@@ -15,6 +15,7 @@ from brakecli.branches.begin import settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.follow import Stop, both_ways, follow
 from brakecli.branches.forced import MOST_PERIODS, Forced
+from brakecli.branches.islands import PARTS, Search, places, tried
 from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Point
@@ -31,6 +32,10 @@ LARGEST = 1e4
 """Amplitude of a cycle over that at the begin of its branch, beyond which it is not followed."""
 MOST = 12
 """Branches of one command."""
+MOST_PUSHED = 4
+"""Of these, such as pushes come to: each costs as much as a branch from flutter."""
+MEETS = 16
+"""Motions of a branch that are looked for on another one; a choice."""
 LONGEST = 0.25
 """Longest stride, in sizes of the motion and of the range."""
 POINTS, ALL_POINTS, SECONDS = 3000, 10_000, 60.0
@@ -55,6 +60,7 @@ class Explored:
     branches: list[Followed]
     notes: list[str]
     interrupted: bool = False
+    search: Search = field(default_factory=Search)
 
 
 Tell = Callable[[str, int, int], None]
@@ -78,9 +84,15 @@ class Explorer:
         self.changes = self.sliding.changes(self.slides)
         self.branches: list[Followed] = []
         self.notes: list[str] = []
+        self.search = Search()
 
-    def explore(self, states: Sequence[tuple[float, Any]] = (), switches: bool = False) -> Explored:
-        """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted."""
+    def explore(
+        self, states: Sequence[tuple[float, Any]] = (), switches: bool = False, pushes: int = 0
+    ) -> Explored:
+        """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted.
+
+        On smooth pads vibrations beside these are sought by five times so many `pushes`.
+        """
         self.branches.append(slid(self.line, self.slides, self.changes))
         if not self.branches[0].points:
             self.notes.append("there is no steady sliding in the range")
@@ -92,12 +104,22 @@ class Explorer:
             self.begin_at(p, state)
         if switches:
             self._doubled()
+        if pushes and self.line.smooth and not is_undamped(self.line.case_coefficients):
+            self._islands(pushes)
         return self.explored
 
     @property
     def explored(self) -> Explored:
         """What has been found so far."""
-        return Explored(self.line, self.slides, self.changes, [*self.branches], [*self.notes], bool(self.stop()))
+        return Explored(
+            line=self.line,
+            slides=self.slides,
+            changes=self.changes,
+            branches=[*self.branches],
+            notes=[*self.notes],
+            interrupted=bool(self.stop()),
+            search=self.search,
+        )
 
     def begin_at(self, p: float, state: Any) -> None:
         """Follow the branch of the motion that a state at a place comes to, if it is not known."""
@@ -193,21 +215,14 @@ class Explorer:
         found = None if self._over() else problem.settled(p, state)
         if found is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no periodic motion")
-        elif self._known(p, found[1]):
+        elif self._known(found[1]):
             self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
         else:
             self._follow(*found, FORCED, f"from the motion given for {value:.6g}", within=True)
 
-    def _known(self, p: float, first: Point) -> bool:
-        """Whether a motion at p lies on a branch that has been followed, perhaps as several of its periods."""
-        for followed in self.branches:
-            for point in crossing(followed, p):
-                one, other = point.facts, first.facts
-                if math.isclose(one.amplitude, other.amplitude, rel_tol=SAME) and any(
-                    math.isclose(k * one.period, other.period, rel_tol=SAME) for k in range(1, MOST_PERIODS + 1)
-                ):
-                    return True
-        return False
+    def _known(self, first: Point) -> bool:
+        """Whether a motion lies on a branch that has been followed, perhaps as several of its periods."""
+        return any(lies_on(followed, first) for followed in self.branches)
 
     def _from_state(self, sliding: Sliding, p: float, state: Any) -> None:
         """The branch of the cycle that a motion comes to; none where it is known already."""
@@ -221,10 +236,41 @@ class Explorer:
         if first is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no limit cycle")
             return
-        if self._known(p, first):
+        if self._known(first):
             self.notes.append(f"the motion given for {value:.6g} comes to a cycle of a branch from flutter")
             return
         self._follow(problem, first, note=f"from the motion given for {value:.6g}", within=True)
+
+    def _islands(self, pushes: int) -> None:
+        """The branches of cycles that pushes come to, if they are not known: each within the whole budget."""
+        begun, search, budget = perf_counter(), self.search, self.points
+        most = len(self.branches) + MOST_PUSHED
+        own = None if self.line.own is None else self.line.place(self.line.own)
+        for p, first, count in places(self.slides, self.changes, own, pushes):
+            if self.stop() or perf_counter() > self.end:
+                break
+            self.tell("pushes", first, PARTS * pushes)
+            ends = tried(self.line.shoe(p), first, count, self.stop)
+            search.pushes += ends.pushes
+            search.undecided += ends.undecided
+            for orbit in ends.orbits:
+                self.points = self.count + budget
+                self._from_push(p, np.array(orbit.state), most)
+        search.seconds = perf_counter() - begun
+
+    def _from_push(self, p: float, state: Any, most: int) -> None:
+        """The branch of the cycle that a push has come to, among so many; none where it is known already."""
+        value, problem = self.line.value(p), self._problem()
+        first = settled(problem, p, state, math.nan)
+        if first is not None and self._known(first):
+            return
+        if first is None or self._over() or len(self.branches) >= most:
+            self.notes.append(f"a vibration that a push at {value:.4g} comes to was not followed")
+        else:
+            self._follow(problem, first, note=f"from a push at {value:.6g}", within=True)
+            *others, followed = self.branches
+            if not any(meets(followed, other) for other in others):
+                self.search.found.append(followed)
 
     def _problem(self) -> Cycles:
         return Cycles(self.line) if self.line.smooth else RoughCycles(self.line)
@@ -256,6 +302,22 @@ def span(followed: Followed) -> tuple[float, float]:
     assert followed.branch is not None
     places = [point.p for point in followed.branch.points]
     return min(places), max(places)
+
+
+def lies_on(followed: Followed, motion: Point) -> bool:
+    """Whether a motion is one of a branch, perhaps as several of its periods."""
+    other = motion.facts
+    return any(
+        math.isclose(one.amplitude, other.amplitude, rel_tol=SAME)
+        and any(math.isclose(k * one.period, other.period, rel_tol=SAME) for k in range(1, MOST_PERIODS + 1))
+        for one in (point.facts for point in crossing(followed, motion.p))
+    )
+
+
+def meets(one: Followed, other: Followed) -> bool:
+    """Whether a branch goes on as another one, which was cut somewhere: some of its motions lie on that."""
+    points = one.branch.points if one.branch is not None else []
+    return any(lies_on(other, point) for point in points[:: max(len(points) // MEETS, 1)])
 
 
 def crossing(followed: Followed, p: float) -> list[Point]:

@@ -2,6 +2,7 @@
 
 import math
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
@@ -59,6 +60,19 @@ class Change:
     error: float  # half the width of its bracket
     frequency: float  # Hz; 0 for divergence
     lost: bool  # as p grows, or regained
+
+
+def stable_spans(
+    slides: Sequence[Slide], changes: Sequence[Change]
+) -> list[tuple[tuple[float, float], tuple[float, float]]]:
+    """The parts of the line where it is stable: both ends of each, with their errors."""
+    there = [slide for slide in slides if not math.isnan(slide.tests[0])]
+    if not there:
+        return []
+    edges = [(change.p, change.error) for change in changes]
+    edges = [(there[0].p, 0.0)] * there[0].stable + edges
+    edges += [(there[-1].p, 0.0)] * (len(edges) % 2)
+    return [(low, high) for low, high in zip(edges[::2], edges[1::2], strict=True) if high[0] > low[0]]
 
 
 class Sliding:

@@ -1,12 +1,13 @@
 """Both thresholds of friction: where sliding loses its stability, and from where on a vibration can exist."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import StabilityReport
 from brakecli.branches.answers import Answers, metres
 from brakecli.branches.explore import Explorer
+from brakecli.branches.islands import Search
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.solver.system import System
@@ -34,6 +35,7 @@ class Thresholds:
     coexists_from: float | None = None
     barrier: float | None = None  # m, half of peak to peak of x of the unstable cycle at the case's own friction
     beside: str = ""  # what there is beside stable sliding, in words
+    search: Search = field(default_factory=Search)  # for vibrations that no branch from flutter reaches
 
     @property
     def sentence(self) -> str | None:
@@ -49,9 +51,11 @@ def thresholds(
     system: System,
     report: StabilityReport,
     tell: Callable[[str, int, int], None] = lambda what, done, total: None,
+    pushes: int = 0,
 ) -> Thresholds:
     """Both thresholds of a case along friction, by the limit cycles that begin where sliding flutters.
 
+    Vibrations to which none of these branches leads are sought by five times so many `pushes`.
     On smooth pads alone: rough ones take seconds to a minute, and `brakecli branch` follows these.
     """
     lost = report.critical
@@ -69,10 +73,16 @@ def thresholds(
     own, highest = report.friction, UP_TO * lost.friction
     if report.stable:
         highest = max(highest, BEYOND * own)
-    explored = Explorer(Line(case, [FRICTION], 0.0, highest), tell, lambda: False, points=POINTS).explore()
+    explorer = Explorer(Line(case, [FRICTION], 0.0, highest), tell, lambda: False, points=POINTS)
+    explored = explorer.explore(pushes=pushes)
     answers = Answers(explored, own if own <= highest else None)
     return Thresholds(
-        lost.friction, lost.instability, answers.coexists_from, answers.barrier, _beside(answers, lost.friction)
+        critical=lost.friction,
+        kind=lost.instability,
+        coexists_from=answers.coexists_from,
+        barrier=answers.barrier,
+        beside="; ".join(filter(None, [_beside(answers, lost.friction), answers.sought])),
+        search=explored.search,
     )
 
 

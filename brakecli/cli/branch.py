@@ -4,7 +4,18 @@ from contextlib import nullcontext
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
+from brakecli.branches.pushes import PUSHES
+from brakecli.cli.options import (
+    AsJson,
+    CaseArgument,
+    Force,
+    ForceRead,
+    Overrides,
+    Pushes,
+    Quiet,
+    option,
+    output_option,
+)
 from brakecli.cli.output import show_result
 from brakecli.files.os_signals import lastly, signals_deferred
 from brakecli.front.inputs import load_case, result_path
@@ -23,6 +34,7 @@ def command(
     overrides: Overrides = None,
     start: Annotated[list[Path] | None, option(START, "FILE.h5")] = None,
     switch: Annotated[bool, option(SWITCH, None, "--switch")] = False,
+    pushes: Pushes = PUSHES,
     force_read: ForceRead = False,
     force: Force = False,
     as_json: AsJson = False,
@@ -51,7 +63,7 @@ def command(
             pass
         kept = f"what was followed up to here is in {target}" if target else ""
         with lastly(lambda: kept), signals_deferred() as waiting:
-            found = branch(line, tell, lambda: bool(waiting), starts, switch)
+            found = branch(line, tell, lambda: bool(waiting), starts, switch, pushes)
             hide_signals()  # from what writes the file
             if target:
                 write(target, loaded, found, units, force=force)

@@ -4,6 +4,7 @@ from typing import Annotated, Any
 
 import typer
 
+from brakecli.branches.pushes import MOST_PUSHES
 from brakecli.cli.output import warn
 from brakecli.files.trust import readings
 from brakecli.solver import compiling
@@ -27,6 +28,8 @@ def output_option(content: str, default: str) -> Any:
 CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
 SET = "KEY.PATH=VALUE", "--set"
 Overrides = Annotated[list[str] | None, option("Set a key of the case, the value in TOML; repeatable.", *SET)]
+PUSHED = "Five times as many pushes seek further vibrations; 0 for none."
+Pushes = Annotated[int, option(PUSHED, "N", min=0, max=MOST_PUSHES)]
 AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
 
 

@@ -4,7 +4,18 @@ from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
-from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
+from brakecli.branches.pushes import PUSHES
+from brakecli.cli.options import (
+    AsJson,
+    CaseArgument,
+    Force,
+    ForceRead,
+    Overrides,
+    Pushes,
+    Quiet,
+    option,
+    output_option,
+)
 from brakecli.cli.output import show_result
 from brakecli.errors import UsageError, printable
 from brakecli.front.inputs import load_case, result_path
@@ -22,6 +33,7 @@ def command(
     output: Annotated[Path | None, output_option("File of --vary: .h5 or .csv", "none")] = None,
     overrides: Overrides = None,
     vary: Annotated[str | None, option(VARY, "KEY[,KEY]=START:STOP:NUM")] = None,
+    pushes: Pushes = PUSHES,
     force_read: ForceRead = False,
     force: Force = False,
     as_json: AsJson = False,
@@ -46,7 +58,7 @@ def command(
             say(text)
         report, found, both = stability(system), None, None
         if not axis:
-            both = thresholds(loaded.case, system, report, show_progress)
+            both = thresholds(loaded.case, system, report, show_progress, pushes)
         else:
             from brakecli.files.atomic import new_output
             from brakecli.sweeps.lock_in import lock_in, write

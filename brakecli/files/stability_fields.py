@@ -3,6 +3,8 @@
 from brakecli.files.field import Field, integer, named, ratio, within
 from brakecli.files.fields import OBJECT, PAIR, POINT, SENTENCE, TEXT, VERDICT
 
+PUSHED = "pushes by which vibrations were sought that no branch from flutter reaches"
+
 # Linear stability
 
 STABILITY = (
@@ -28,6 +30,7 @@ THRESHOLDS = (
         "least friction coefficient with a stable vibration beside stable sliding; null where none is known",
     ),
     Field("barrier", "m", "half of peak to peak of x of the unstable cycle at φ; null without one"),
+    integer("pushes", PUSHED, "search.pushes"),
     Field("sentence", "", "both thresholds in words; null where stability is not lost", TEXT),
 )
 """Fields of limit cycles along friction, beside linear stability."""
@@ -94,6 +97,7 @@ BRANCH = (
     Field("critical_windows_upper", "of the key", "their upper ends", OBJECT),
     Field("coexists_from", "of the key", "least value with a stable vibration beside stable sliding"),
     Field("barrier", "m", "half of peak to peak of x of the unstable cycle at the value of the case itself"),
+    integer("pushes", PUSHED, "explored.search.pushes"),
     Field("sentence", "", "the answer in words", TEXT),
     Field("branches", "", "all branches", OBJECT, in_file=False, rows=ONE_BRANCH),
 )

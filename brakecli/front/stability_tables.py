@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from brakecli.analysis.stability.modes import Crossing
     from brakecli.analysis.stability.report import StabilityReport
     from brakecli.branches.answers import Answers
+    from brakecli.branches.islands import Search
     from brakecli.branches.thresholds import Thresholds
     from brakecli.branches.told import Followed
     from brakecli.runs.advise import AdviceReport
@@ -65,6 +66,7 @@ def stability_table(
             ("its critical friction", "none" if friction is None else f"{friction:.7g}{bias}"),
             ("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
         ]
+    rows += _search(both.search) if both else []
     if both and both.sentence:
         rows.append(("in a sentence", both.sentence))
     if output:
@@ -78,6 +80,13 @@ def _coexisting(both: Thresholds | Answers | None, units: str = "") -> list[Row]
         return []
     barrier = [] if both.barrier is None else [("barrier", text_of(both.barrier, "m", ".4g"))]
     return [("can vibrate from", text_of(both.coexists_from, units, ".7g")), *barrier]
+
+
+def _search(search: Search) -> list[Row]:
+    """How widely vibrations were sought that no branch from flutter reaches, and how long that took."""
+    if not search.pushes:
+        return []
+    return [("search for other vibrations", f"{search.seconds:.1f} s, {search.pushes} pushes")]
 
 
 def _lock_in(found: LockIn) -> str:
@@ -160,6 +169,7 @@ def branch_table(title: str, found: Answers, units: str, output: Path | None = N
         ("along", f"{found.parameter} from {found.lower:g} to {found.upper:g} {units.removeprefix('1')}".strip()),
         ("critical", text_of(found.critical, units.removeprefix("1"), ".7g")),
         *_coexisting(found, units.removeprefix("1")),
+        *_search(found.explored.search),
     ]
     parts = [two_columns(title, rows)]
     for number, each in enumerate(found.branches):

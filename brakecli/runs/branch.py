@@ -84,9 +84,17 @@ def start_of(path: Path, keys: Sequence[str]) -> Start:
 
 
 def branch(
-    line: Line, tell: Counted, stop: Callable[[], bool], starts: Sequence[Start] = (), switch: bool = False
+    line: Line,
+    tell: Counted,
+    stop: Callable[[], bool],
+    starts: Sequence[Start] = (),
+    switch: bool = False,
+    pushes: int = 0,
 ) -> Answers:
-    """Follow all branches of a line. `stop` ends the work and keeps what there is."""
+    """Follow all branches of a line, and those that five times so many `pushes` come to.
+
+    `stop` ends the work and keeps what there is.
+    """
     states = []
     for start in starts:
         value = line.own if start.value is None else start.value
@@ -96,7 +104,7 @@ def branch(
                 f"widen {argument('parameter')}"
             )
         states.append((line.place(value), start.state))
-    return Answers(Explorer(line, tell, stop).explore(states, switch), line.own)
+    return Answers(Explorer(line, tell, stop).explore(states, switch, pushes), line.own)
 
 
 def write(path: Path, loaded: LoadedCase, found: Answers, units: str, *, force: bool) -> None:

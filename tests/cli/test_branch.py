@@ -3,7 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -161,6 +161,18 @@ def test_the_function_gives_the_same_branches(here: Path, found: dict[str, Any])
     assert tree["branch_1/value"].to_numpy().tolist() == [each["value"] for each in found["branches"][1]["points"]]
     with pytest.raises(UsageError, match="two numbers"):
         brakecli.branch(here / "branch.toml", parameter={"friction.coefficient": 3.0})  # type: ignore[dict-item]
+
+
+def test_functions_take_a_number_of_pushes(here: Path) -> None:
+    case, along = here / "branch.toml", cast(Any, {"friction.coefficient": (0.0, 1.0)})
+    assert brakecli.branch(case, parameter=along, pushes=3).attrs["pushes"] == 15
+    assert int(brakecli.stability(case, pushes=0).pushes) == 0
+    wrong: Any
+    for wrong in (-1, 2.5, True, "many", 10**9):
+        with pytest.raises(UsageError, match="is no whole number from 0 to 100000"):
+            brakecli.stability(case, pushes=wrong)
+        with pytest.raises(UsageError, match="is no whole number from 0 to 100000"):
+            brakecli.branch(case, parameter=along, pushes=wrong)
 
 
 @campaign

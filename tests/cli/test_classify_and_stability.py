@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -283,9 +284,38 @@ def test_stability_and_advise_name_both_thresholds_as_branch_does(here: Path) ->
         assert found["coexists_from"] == pytest.approx(branch.json["coexists_from"], rel=1e-8)
         assert found["barrier"] == pytest.approx(branch.json["barrier"], rel=1e-6)
     words = "a vibration can exist from 0.1688 on, at the case's 0.4 after a push beyond 1.4 µm"
-    assert stable.json["sentence"] == f"sliding loses stability at 0.4877; {words}"
+    sought = "no other vibration found in 640 pushes"
+    assert stable.json["sentence"] == f"sliding loses stability at 0.4877; {words}; {sought}"
+    assert branch.json["sentence"].endswith(f"; {sought}")
+    assert (stable.json["pushes"], branch.json["pushes"]) == (640, 640)
     assert words in advised.json["conclusion"]
     assert words in " ".join(table.out.split())
+    assert re.search(r"search for other vibrations +\d+\.\d s, 640 pushes\n", table.out)
+    assert "pushes" not in advised.out
+
+
+def test_fewer_pushes_may_be_asked_for_or_none(here: Path) -> None:
+    brakecli("new", "branch", "--force", cwd=here)
+    along = ["--parameter", "friction.coefficient=0:1"]
+    few, none, branch, rough = each(
+        here,
+        [
+            ["stability", "branch.toml", "--pushes", "2", "--json"],
+            ["stability", "branch.toml", "--pushes", "0"],
+            ["branch", "branch.toml", *along, "--pushes", "0", "--json"],
+            [
+                "stability",
+                "branch.toml",
+                "--set",
+                "roughness.wheel={amplitudes=[1e-9], wavelengths=[0.01]}",
+                "--json",
+            ],
+        ],
+    )
+    assert few.json["sentence"].endswith("; no other vibration found in 10 pushes")
+    assert "pushes" not in none.out
+    assert "other vibration" not in none.out + branch.json["sentence"] + rough.json["sentence"]
+    assert (branch.json["pushes"], rough.json["pushes"]) == (0, 0)
 
 
 def test_where_no_vibration_exists_below_both_names_are_null(here: Path) -> None:
@@ -302,7 +332,8 @@ def test_where_no_vibration_exists_below_both_names_are_null(here: Path) -> None
     for found in (stable.json, stands.json, advised.json):
         assert (found["coexists_from"], found["barrier"]) == (None, None)
     below = "the vibration that begins there does not exist below it"
-    assert stable.json["sentence"] == f"sliding loses stability at 0.5754; {below}"
+    sought = "no other vibration found in 640 pushes"
+    assert stable.json["sentence"] == f"sliding loses stability at 0.5754; {below}; {sought}"
     assert stands.json["sentence"] is None
     assert below in advised.json["conclusion"]
     assert not {"coexists_from", "barrier", "sentence"} & varied.json.keys()
