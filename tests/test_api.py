@@ -3,15 +3,17 @@
 import hashlib
 import json
 import math
+import multiprocessing
 import signal
 import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from fractions import Fraction
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import h5py
 import numpy as np
@@ -23,7 +25,7 @@ from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, Usa
 from brakecli.front import progress
 from brakecli.front.progress import telling
 from tests.campaign import campaign
-from tests.commands import QUICK, ROOT, TINY
+from tests.commands import QUICK, ROOT, TINY, left_in
 from tests.commands import brakecli as command
 
 HERE = Path()
@@ -238,7 +240,7 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         for huge in (10**400, -(10**5000)):
             with pytest.raises(UsageError, match=f"^{given}: is too large for a number"):
                 brakecli.classify(CASE, "force", **{given: huge})  # type: ignore[arg-type]
-    with pytest.raises(UsageError, match="output 5: is no path"):
+    with pytest.raises(UsageError, match=r"output: is no path \(found 5\)"):
         brakecli.run(CASE, SHORT, output=5)  # type: ignore[arg-type]
     (tmp_path / "own.toml").write_text(TINY)
     with pytest.raises(UsageError, match="is no result, and is not replaced by one"):
@@ -563,6 +565,133 @@ def test_what_a_line_has_counted_is_told_to_its_end(
             tell("points", done, total)
     told = ["brakecli: points 1 of 9, 25 s", "brakecli: points 9 of 9, 31 s"]
     assert capsys.readouterr().err.splitlines() == told
+
+
+ALONG: dict[Any, Any] = {"friction.coefficient": (0.1, 0.9)}
+FEW = STUDY.replace("samples = 64", 'samples = 8\nindices_of = "none"')
+TELLING: dict[str, Callable[[Any], Any]] = {
+    "run": lambda tell: brakecli.run("c.toml", progress=tell),
+    "settled": lambda tell: brakecli.run(CASE, {"solver": {"duration": "settled"}}, progress=tell),
+    "stability": lambda tell: brakecli.stability(CASE, progress=tell),
+    "vary": lambda tell: brakecli.stability("c.toml", vary={"friction.coefficient": [0.1, 0.9]}, progress=tell),
+    "branch": lambda tell: brakecli.branch(CASE, parameter=ALONG, progress=tell),
+    "advise": lambda tell: brakecli.advise("c.toml", progress=tell),
+    "sweep": lambda tell: brakecli.sweep("c.toml", axes=ALONG, jobs=1, progress=tell),
+    "scatter": lambda tell: brakecli.scatter("few.toml", jobs=1, progress=tell),
+    "report": lambda tell: brakecli.report("sweep.h5", progress=tell),
+}
+
+
+@pytest.mark.parametrize("function", TELLING)
+def test_what_a_function_that_is_told_the_progress_raises_comes_out_as_it_is(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, function: str
+) -> None:
+    """Also kinds of exceptions that the code on the way handles."""
+    monkeypatch.chdir(tmp_path)
+    Path("c.toml").write_text(TINY)
+    Path("few.toml").write_text(FEW)
+    if function == "report":
+        brakecli.sweep("c.toml", axes=ALONG, jobs=1, output="sweep.h5")
+    left = left_in(tmp_path)
+    kinds = OverflowError, KeyboardInterrupt, CaseError, TimeoutError, np.linalg.LinAlgError
+    for error in (kind([]) for kind in kinds):
+
+        def tell(what: str, done: int, total: int, error: BaseException = error) -> None:
+            raise error
+
+        with pytest.raises(type(error)) as raised:
+            TELLING[function](tell)
+        assert raised.value is error
+    assert left_in(tmp_path) == left
+
+
+HUGE = 10**5000
+FOREIGN: dict[str, tuple[str, Callable[[], Any]]] = {
+    "keys of advice": ("keys: are no key paths (found 5)", lambda: brakecli.advise(CASE, keys=cast(Any, 5))),
+    "a key of advice": ("keys: are no key paths", lambda: brakecli.advise(CASE, keys=cast(Any, [HUGE]))),
+    "a margin": ("margin: is no number from 0 to 10", lambda: brakecli.advise(CASE, margin=HUGE)),
+    "a key": ("settings: a key is no text (found 5)", lambda: brakecli.stability(CASE, cast(Any, {5: 0.1}))),
+    "an inner key": ("shoe: a key is no text", lambda: brakecli.run(CASE, {"shoe": {5: 0.1}})),
+    "a value": ("shoe.mass: is too large for a number", lambda: brakecli.run(CASE, {"shoe.mass": HUGE})),
+    "a variable": ("variable: is no text (found a table)", lambda: brakecli.plot(CASE, variable=cast(Any, {}))),
+    "a section": ("section: is no text", lambda: brakecli.plot(CASE, section=cast(Any, {}))),
+    "a compared variable": (
+        "variable: is no text",
+        lambda: brakecli.diff("r.h5", "r.h5", output="x.png", variable=cast(Any, {})),
+    ),
+    "a selection": ("select: a key is no text", lambda: brakecli.plot("r.h5", select=cast(Any, {5: 1}))),
+    "a chosen value": ("select: x: is too large", lambda: brakecli.plot("r.h5", select={"x": HUGE})),
+    "keys of a branch": (
+        'parameter: a key is no text (found ["a", 3])',
+        lambda: brakecli.branch(CASE, parameter=cast(Any, {("a", 3): (0, 1)})),
+    ),
+    "an end of a branch": (
+        "parameter: is not both ends of a range",
+        lambda: brakecli.branch(CASE, parameter={"shoe.mass": (0, HUGE)}),
+    ),
+    "jobs": ("jobs: is no number of workers", lambda: brakecli.sweep(CASE, axes=ALONG, jobs=HUGE)),
+    "a key of an axis": ("axes: a key is no text", lambda: brakecli.sweep(CASE, axes=cast(Any, {5: [1]}))),
+    "a value of an axis": ("sweep.axis.values: is too large", lambda: brakecli.sweep(CASE, axes={"x": [HUGE]})),
+    "a text of an axis": ("sweep.axis.values: is not UTF-8", lambda: brakecli.sweep(CASE, axes={"x": ["\udcff"]})),
+    "a followed key": (
+        "direction: a key is no text",
+        lambda: brakecli.sweep(CASE, axes=ALONG, direction=cast(Any, {5: "up"})),
+    ),
+    "a column": ("points: a key is no text", lambda: brakecli.sweep(CASE, points=cast(Any, {5: [1]}))),
+    "a point": ("points.x: is too large", lambda: brakecli.sweep(CASE, points={"x": [HUGE]})),
+    "a search": ("critical: a key is no text", lambda: brakecli.sweep(CASE, critical=cast(Any, {5: 1}))),
+    "a scheduler": ("scheduler: is none", lambda: brakecli.sweep(CASE, axes=ALONG, scheduler=HUGE)),
+    "a varied key": ("vary: a key is no text", lambda: brakecli.stability(CASE, vary=cast(Any, {5: [1, 2]}))),
+    "a varied value": ("vary.values: is too large", lambda: brakecli.stability(CASE, vary={"x": [1, HUGE]})),
+    "samples": ("samples: is too large for a number", lambda: brakecli.scatter("s.toml", {"samples": HUGE})),
+    "a study": ("int: is no path", lambda: brakecli.scatter(cast(Any, HUGE))),
+    "a file": ("int: is no path", lambda: brakecli.load(cast(Any, HUGE))),
+    "an output": ("output: is no path", lambda: brakecli.run(CASE, SHORT, output=cast(Any, HUGE))),
+    "a threshold": (
+        "thresholds: a key is no text",
+        lambda: brakecli.classify("r.h5", thresholds=cast(Any, {5: 1})),
+    ),
+    "its value": ("thresholds: few: is too large", lambda: brakecli.classify("r.h5", thresholds={"few": HUGE})),
+    "a quantity": ("quantity: is no text", lambda: brakecli.classify("r.csv", cast(Any, {}))),
+    "a column of a file": (
+        "column: is too large",
+        lambda: brakecli.classify("r.csv", "force", column=HUGE, sample_rate=1.0),
+    ),
+}
+
+
+@pytest.mark.parametrize("given", FOREIGN)
+def test_what_no_function_takes_is_an_error_of_usage(given: str) -> None:
+    said, call = FOREIGN[given]
+    with pytest.raises(UsageError) as refused:
+        call()
+    assert str(refused.value).startswith(said)
+    assert "; " in str(refused.value)
+
+
+def test_a_number_of_hundreds_of_digits_is_out_of_range(tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(TINY)
+    for values in ([0.1, 10**300], [10**300, 1]):
+        axes: dict[Any, Any] = {"friction.coefficient": values}
+        with pytest.raises(CaseError, match=r"friction\.coefficient: is not between 1e-100 and 1e\+100"):
+            brakecli.sweep(tmp_path / "c.toml", axes=axes, direction="up", jobs=1)
+    text = f'case = "c.toml"\n[[axis]]\nparameter = "shoe.mass"\ndirection = "up"\nvalues = [1, {10**400}]\n'
+    (tmp_path / "s.toml").write_text(text)
+    with pytest.raises(CaseError, match=r"direction: needs numbers to follow"):
+        brakecli.sweep(tmp_path / "s.toml", jobs=1)
+
+
+def _swept(case: str, jobs: int) -> list[float]:
+    found = brakecli.sweep(case, axes=ALONG, jobs=jobs)
+    return [float(each) for each in found.amplitude]
+
+
+def test_a_worker_of_a_pool_computes_a_sweep_itself(tmp_path: Path) -> None:
+    """It may start no processes."""
+    (tmp_path / "c.toml").write_text(TINY)
+    case = str(tmp_path / "c.toml")
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
+        assert pool.apply(_swept, (case, 2)) == _swept(case, 1)
 
 
 @campaign

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias
 
-from brakecli.errors import UsageError
+from brakecli.errors import UsageError, found
 from brakecli.faces import in_python
 from brakecli.files.trust import readings
 from brakecli.stop import signals_shown
@@ -47,16 +47,36 @@ def readings_told(*, force_read: bool = False) -> Iterator[None]:
     warn(said, 5)  # the caller of who uses this block
 
 
+class _OfCaller(BaseException):
+    """Carries what a function of the caller has raised past all that handles exceptions on the way."""
+
+
 @contextmanager
 def telling_to(progress: "Progress") -> Iterator["Counted"]:
-    """What tells the progress: a function of the caller, or that of the commands."""
+    """What tells the progress: a function of the caller, or that of the commands.
+
+    What the function of the caller raises comes out of the block as it was raised.
+    """
     from brakecli.front.progress import telling
 
-    if callable(progress):
-        yield progress
+    if not callable(progress):
+        with telling(not progress, first_line=1.0) as tell:
+            yield tell
         return
-    with telling(not progress, first_line=1.0) as tell:
-        yield tell
+
+    def carried(what: str, done: int, total: int) -> None:
+        try:
+            progress(what, done, total)
+        except BaseException as error:
+            raise _OfCaller from error
+
+    try:
+        yield carried
+    except _OfCaller as end:
+        error = end.__cause__
+        assert error is not None
+        error.__suppress_context__ = True
+        raise error  # noqa: B904 - it is its own cause
 
 
 @contextmanager
@@ -64,7 +84,7 @@ def target(output: "str | PathLike[str] | None", name: str = "result.h5") -> Ite
     """Where a result goes: to a file that stays, or to one that does not."""
     if output is not None:
         if not isinstance(output, str | PathLike):
-            raise UsageError(f"output {output!r}: is no path; give one, or leave it out")
+            raise UsageError(f"output: is no path{found(output)}; give one, or leave it out")
         yield Path(output)
         return
     with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:

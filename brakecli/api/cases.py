@@ -7,7 +7,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from brakecli.api.calls import as_files, interruptible, readings_told, target, telling_to, warn
-from brakecli.api.given import axis_of, case_of, ends_of, mapping, pushes_of, study_of
+from brakecli.api.given import axis_of, case_of, ends_of, mapping, margin_of, patterns_of, pushes_of, study_of
 from brakecli.branches.pushes import PUSHES
 from brakecli.errors import BrakecliError, UsageError
 
@@ -151,12 +151,13 @@ def branch(
     """
     with interruptible(), readings_told(), target(output) as path, telling_to(progress) as tell:
         loaded = case_of(case, settings)
+        from brakecli.branches.explore import Explorer
         from brakecli.files.as_xarray import opened
-        from brakecli.runs.branch import branch, line_of, parsed, start_of, write
+        from brakecli.runs.branch import branch, line_of, parsed, start_of, states_of, write
         from brakecli.runs.limits import within_range
         from brakecli.sweeps.result import unit
 
-        if len(mapping(parameter, "parameter")) != 1:
+        if len(mapping(parameter, "parameter", several=True)) != 1:
             raise UsageError("parameter: takes one key with both ends of its range, or one tuple of keys")
         [(names, ends)] = parameter.items()
         low, high = ends_of(ends)
@@ -166,8 +167,8 @@ def branch(
             line = line_of(loaded, keys, low, high, "parameter")
         given: Iterable[Any] = start if isinstance(start, list | tuple) else [start] if start is not None else []
         with as_files(given, "start") as files:
-            starts = [start_of(file, keys) for file in files]
-        found = branch(line, tell, lambda: False, starts, switch, pushes_of(pushes))
+            states = states_of(line, [start_of(file, keys) for file in files])
+        found = branch(Explorer(line, tell), states, switch, pushes_of(pushes))
         write(path, loaded, found, unit(keys[0]), force=force)
         return opened(path, own=True)
 
@@ -211,9 +212,7 @@ def advise(
         from brakecli.runs.limits import within_range
         from brakecli.runs.run import load_kernels
 
-        if not (isinstance(margin, int | float) and 0.0 <= margin <= 10.0):
-            raise UsageError(f"margin {margin}: is no number from 0 to 10")
-        patterns = keys.split(",") if isinstance(keys, str) else KEYS if keys is None else [*map(str, keys)]
+        patterns, margin = KEYS if keys is None else patterns_of(keys), margin_of(margin)
         study = replace(study_of(scatter), base=loaded) if scatter is not None else None
         load_kernels(loaded)
         with within_range():

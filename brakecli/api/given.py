@@ -6,10 +6,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from datetime import date, time
 from itertools import pairwise
+from numbers import Real
 from os import PathLike
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.errors import UnreadableResultError, UsageError, found, value_text
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 
     Source: TypeAlias = str | PathLike[str] | LoadedCase
     Settings = Mapping[str, Any]
+
+_LARGEST_BITS = 1024  # of whole numbers: larger ones are no float, and have too many digits to be written
 
 
 def case_of(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
@@ -38,7 +41,14 @@ def case_of(source: "Source | LoadedSweep", settings: "Settings | None") -> "Loa
         return parse_resolved(str(resolved), "its case", overrides(settings))
     if not isinstance(source, str | PathLike):
         raise UsageError(f"{type(source).__name__}: is no case; give a path, or a case from brakecli.load")
-    return load_case(str(source), overrides(settings))
+    return load_case(path_of(source), overrides(settings))
+
+
+def path_of(source: Any) -> str:
+    """The path of a file; raises UsageError for what is none."""
+    if not isinstance(source, str | PathLike) or not isinstance(path := os.fspath(source), str):
+        raise UsageError(f"{type(source).__name__}: is no path; give one, or what brakecli.load gave")
+    return path
 
 
 def study_of(source: Any, settings: "Settings | None" = None) -> "LoadedStudy":
@@ -47,7 +57,7 @@ def study_of(source: Any, settings: "Settings | None" = None) -> "LoadedStudy":
     from brakecli.scattering.study import LoadedStudy
 
     if not isinstance(source, LoadedStudy):
-        return load_study(str(source), overrides(settings))
+        return load_study(path_of(source), overrides(settings))
     if settings:
         raise UsageError("settings: come too late for a study that was loaded; give them to brakecli.load")
     return source
@@ -74,7 +84,7 @@ def axis_of(vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings]") 
     from brakecli.case.read import parse_table
     from brakecli.sweeps.tables import Axis
 
-    if len(mapping(vary, "vary")) != 1:
+    if len(mapping(vary, "vary", several=True)) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
     along = values if isinstance(values, Mapping) else {"values": values}
@@ -88,11 +98,11 @@ def axis_of(vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings]") 
 
 def axes_of(axes: Any, direction: Any) -> list[dict[str, Any]]:
     """The tables `[[axis]]` of a sweep."""
-    given = mapping(axes, "axes")
+    given = mapping(axes, "axes", several=True)
     ways = dict.fromkeys(given, direction) if isinstance(direction, str) and len(given) == 1 else direction
-    ways = mapping(ways, "direction")
+    ways = mapping(ways, "direction", several=True)
     if unknown := [key for key in ways if key not in given]:
-        raise UsageError(f"direction: {unknown[0]!r} is not among the axes; name an axis as axes does")
+        raise UsageError(f"direction: {value_text(unknown[0])} is not among the axes; name an axis as axes does")
     return [
         {"parameter": key}
         | dict(each if isinstance(each, Mapping) else {"values": each})
@@ -105,20 +115,49 @@ def ends_of(given: Any) -> tuple[float, float]:
     """Both ends of a range; raises UsageError for anything else."""
     try:
         low, high = map(float, given)
-    except (TypeError, ValueError):
-        raise UsageError(f"parameter: {given!r} is not both ends of a range; give two numbers") from None
+    except (TypeError, ValueError, OverflowError):
+        raise UsageError(f"parameter: is not both ends of a range{found(given)}; give two numbers") from None
     return low, high
+
+
+def patterns_of(keys: Any) -> list[str]:
+    """Patterns of keys, as one text with commas or as a list of texts."""
+    given = keys.split(",") if isinstance(keys, str) else [*keys] if isinstance(keys, Iterable) else [keys]
+    if wrong := [each for each in given if not isinstance(each, str)]:
+        raise UsageError(f"keys: are no key paths{found(wrong[0])}; give a text, or a list of texts")
+    return given
+
+
+def margin_of(margin: Any) -> float:
+    """A margin of friction, as a part of it."""
+    number = margin.item() if hasattr(margin, "item") else margin  # of NumPy
+    if not (isinstance(number, int | float) and 0.0 <= number <= 10.0):
+        raise UsageError(f"margin: is no number from 0 to 10{found(number)}; give one, as 0.2")
+    return float(number)
+
+
+def chosen_of(given: "Settings | None", name: str) -> list[str]:
+    """Values by name as options have them, as `KEY=VALUE`."""
+    return [f"{key}={plain(value, f'{name}: {key}')}" for key, value in mapping(given, name).items()]
+
+
+def text_of(given: Any, name: str) -> str:
+    """A text, empty for None; raises UsageError for anything else."""
+    if not isinstance(given, str | None):
+        raise UsageError(f"{name}: is no text{found(given)}; give one, or leave it out")
+    return given or ""
 
 
 def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
     """Points that are given by columns; a data frame has them as well."""
     from brakecli.case.read import key_path
-    from brakecli.sweeps.listed import Listed
+    from brakecli.sweeps.listed import Listed, refuse_many
 
     if points is None:
         return None
     if not hasattr(points, "keys"):
         raise UsageError("points: are no columns; write them as {'friction.coefficient': [0.3, 0.5]}")
+    refuse_many(len(points.keys()), 0, "points")
     columns = plain({key: points[key] for key in points}, "points")
     if wrong := [key for key in columns if not key_path(key)]:
         raise UsageError(f"points: {wrong[0]!r} is no key path; name a key as in 'link2.angle_deg'")
@@ -127,6 +166,7 @@ def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
     lists = [each for each in columns.values() if isinstance(each, list)]
     if len(lists) < len(columns) or len({*map(len, lists)}) != 1 or not all(lists):
         raise UsageError("points: need a value of each key at each point, and one point at least")
+    refuse_many(len(columns), len(lists[0]), "points")
     return Listed.of([*columns], columns.values())
 
 
@@ -140,27 +180,33 @@ def measured_of(
     if unknown := sorted(reading.keys() - {*how}):
         raise UsageError(f"{function}: there is no argument {unknown[0]}; give one of {', '.join(how)}")
     given = {"quantity": quantity, "belt_speed": belt_speed, "stiffness": stiffness, **reading}
-    texts = {name: str(each) for name, each in given.items() if each is not None and name not in NUMBERS}
+    others = {name: plain(each, name) for name, each in given.items() if each is not None and name not in NUMBERS}
+    texts = {name: str(each) if isinstance(each, int) else text_of(each, name) for name, each in others.items()}
     return Measured(**given | texts)
 
 
 def scheduler_of(given: Any) -> Any:
     """The scheduler that is given, or the address in the environment; None without one."""
+    if isinstance(given, Real):
+        raise UsageError(f"scheduler: is none{found(given)}; give a client, a cluster or an address of dask")
     return given if given is not None else os.environ.get("DASK_SCHEDULER_ADDRESS") or None
 
 
 def refuse_jobs(jobs: int | None) -> None:
     """Raise UsageError for a wrong number of workers, and end a worker that is being started by a script."""
     if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
-        raise UsageError(f"jobs {jobs}: is no number of workers from 1 to 4096")
+        raise UsageError(f"jobs: is no number of workers from 1 to 4096{found(jobs)}; give one, or leave it out")
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
 
 
-def mapping(given: Any, name: str) -> Mapping[Any, Any]:
-    """A mapping, empty for None; raises UsageError for anything else."""
+def mapping(given: Any, name: str, *, several: bool = False) -> Mapping[Any, Any]:
+    """A mapping by key paths, or by tuples of `several`; empty for None. Raises UsageError for anything else."""
     if not isinstance(given, Mapping | None):
         raise UsageError(f"{name}: is no mapping; write it as {{'friction.coefficient': ...}}")
+    for key in given or {}:
+        if not all(isinstance(each, str) for each in (key if several and isinstance(key, tuple) else (key,))):
+            raise UsageError(f"{name}: a key is no text{found(key)}; write it as 'friction.coefficient'")
     return given or {}
 
 
@@ -190,9 +236,13 @@ def plain(value: Any, key: str) -> Any:
     value = value.to_numpy() if hasattr(value, "to_numpy") else value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
-        return {str(name): plain(each, f"{key}.{name}") for name, each in value.items()}
+        return {name: plain(each, f"{key}.{name}") for name, each in mapping(value, key).items()}
     if isinstance(value, Iterable) and not isinstance(value, str):
         return [plain(each, key) for each in value]
     if not isinstance(value, str | int | float | date | time | PathLike):
         raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
+    if isinstance(value, str) and not value.isascii() and any(0xD800 <= ord(sign) < 0xE000 for sign in value):
+        raise UsageError(f"{key}: is not UTF-8{found(value)}; write it in UTF-8")
+    if isinstance(value, int) and value.bit_length() >= _LARGEST_BITS:
+        raise UsageError(f"{key}: is too large for a number{found(value)}; give a smaller one")
     return str(value) if isinstance(value, PathLike) else value

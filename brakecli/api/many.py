@@ -7,7 +7,18 @@ from os import PathLike
 from typing import TYPE_CHECKING, Any
 
 from brakecli.api.calls import interruptible, readings_told, target, telling_to, warn
-from brakecli.api.given import axes_of, case_of, overrides, plain, points_of, refuse_jobs, scheduler_of, study_of
+from brakecli.api.given import (
+    axes_of,
+    case_of,
+    mapping,
+    overrides,
+    path_of,
+    plain,
+    points_of,
+    refuse_jobs,
+    scheduler_of,
+    study_of,
+)
 from brakecli.errors import UsageError
 
 if TYPE_CHECKING:
@@ -72,7 +83,7 @@ def sweep(
 
         if axes is not None or points is not None or critical is not None:
             listed = points_of(points)
-            tables = {"case": "-", "axis": axes_of(axes, direction), "critical": critical or {}}
+            tables = {"case": "-", "axis": axes_of(axes, direction), "critical": mapping(critical, "critical")}
             given = plain(tables, "sweep")
             given |= {"points": GIVEN} if listed else {}
             loaded = sweep_of(
@@ -81,7 +92,7 @@ def sweep(
         elif direction is not None:
             raise UsageError("direction: is for axes; a sweep file states it in an axis of its own")
         elif not isinstance(source, LoadedSweep):
-            loaded = load_sweep(str(source), overrides(settings))
+            loaded = load_sweep(path_of(source), overrides(settings))
         elif settings:
             raise UsageError("settings: come too late for a sweep that was loaded; give them to brakecli.load")
         else:

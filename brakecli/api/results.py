@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from brakecli.api.calls import as_files, interruptible, readings_told, target, telling_to, warn
-from brakecli.api.given import mapping, measured_of, overrides
+from brakecli.api.given import chosen_of, measured_of, overrides, path_of, text_of
 from brakecli.errors import UsageError
 from brakecli.faces import in_python
 
@@ -33,7 +33,7 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, f
     """
     from brakecli.front.inputs import is_result, kind_of_file, load_case, load_study, load_sweep
 
-    name = str(source)
+    name = path_of(source)
     with in_python(), readings_told(force_read=force_read):
         if is_result(name):
             if settings:
@@ -79,7 +79,7 @@ def classify(
 
     if "second_run" in reading:
         raise UsageError("classify: second_run: there is none any more; every verdict asks what it asked")
-    changes = [f"{name}={value}" for name, value in mapping(thresholds, "thresholds").items()]
+    changes = chosen_of(thresholds, "thresholds")
     measured = measured_of("classify", quantity, belt_speed, stiffness, reading)
     with interruptible(), readings_told(force_read=force_read), as_files([source], "result") as (file,):
         numbers = verdict_on(str(file), measured, changes)
@@ -126,6 +126,7 @@ def plot(
     from brakecli.plots.result import plot_result, plot_signal
 
     measured = measured_of("plot", quantity, belt_speed, stiffness, reading)
+    shown, cut = text_of(variable, "variable"), text_of(section, "section")
     with (
         interruptible(),
         readings_told(force_read=force_read),
@@ -133,9 +134,8 @@ def plot(
         as_files([result], "result") as (file,),
     ):
         if measured.quantity_of(str(file)) is None:
-            chosen = [f"{key}={value}" for key, value in mapping(select, "select").items()]
-            return plot_result(file, path, chosen, variable or "", section or "", force=force)
-        if select or variable or section:
+            return plot_result(file, path, chosen_of(select, "select"), shown, cut, force=force)
+        if select or shown or cut:
             what = "select, variable and section"
             raise UsageError(f"{what}: are for results; leave them out for a measured signal")
         look = measured.look_at(str(file))
@@ -209,6 +209,7 @@ def diff(
     Raises:
         UsageError, UnreadableResultError, CannotWriteError: as `brakecli diff`.
     """
+    shown = text_of(variable, "variable")
     with (
         interruptible(),
         readings_told(force_read=force_read),
@@ -224,5 +225,5 @@ def diff(
         if output is not None:
             from brakecli.plots.result import plot_two
 
-            plot_two(files[0], files[1], path, force=force, variable=variable or "")
+            plot_two(files[0], files[1], path, force=force, variable=shown)
         return found

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
 from itertools import pairwise
 from time import perf_counter
 from typing import Any
@@ -70,9 +69,16 @@ class Explorer:
     """Follows one branch after another, within a budget of time, until it is stopped."""
 
     def __init__(
-        self, line: Line, tell: Tell, stop: Stop, seconds: float = SECONDS, points: int = ALL_POINTS
+        self,
+        line: Line,
+        tell: Tell,
+        stop: Stop = lambda: False,
+        seconds: float = SECONDS,
+        points: int = ALL_POINTS,
     ) -> None:
-        """`tell` shows how many points there are; `stop` ends the work, and keeps what was found.
+        """Look at steady sliding, and at the waves. What takes longer is left to `explore`.
+
+        `tell` shows how many points there are; `stop` ends the work, and keeps what was found.
 
         The budget of `points` is that of all branches; that of `seconds` is for a user who waits. Where the same
         bytes must come out again, it is infinite.
@@ -85,6 +91,7 @@ class Explorer:
         self.branches: list[Followed] = []
         self.notes: list[str] = []
         self.search = Search()
+        self.waves = None if line.case.roughness.wheel is None else self._waves()
 
     def explore(
         self, states: Sequence[tuple[float, Any]] = (), switches: bool = False, pushes: int = 0
@@ -95,7 +102,7 @@ class Explorer:
         """
         self.branches.append(slid(self.line, self.slides, self.changes))
         if not self.branches[0].points:
-            self.notes.append("there is no steady sliding in the range")
+            self.notes.insert(0, "there is no steady sliding in the range")
         if self.line.case.roughness.wheel is not None:
             self._forced()
         else:
@@ -186,8 +193,7 @@ class Explorer:
                 continue
             self._follow(problem, first, change=change, changes=changes)
 
-    @cached_property
-    def waves(self) -> Forced | None:
+    def _waves(self) -> Forced | None:
         """The problem of motions that a rough wheel forces; None where there are none that repeat."""
         try:
             return Forced.along(self.line)

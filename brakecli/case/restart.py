@@ -1,5 +1,6 @@
 """The end of a run in a result file, at which another run begins."""
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -16,24 +17,43 @@ from brakecli.solver.system import System
 _STATE = ("x", "y", "vx", "vy")
 
 
-def end_of(path: Path) -> dict[str, float]:
-    """The keys of `initial` at the last sample of a run: x, y (m), vx, vy (m/s) and wheel_angle (rad).
+@dataclass(frozen=True)
+class End:
+    """The last sample of a run: its case, its time (s), and x, y (m), v_x and v_y (m/s)."""
+
+    case: Case
+    time: float
+    state: list[float]
+
+
+def last_of(path: Path) -> End:
+    """The end of a run; the one reader of it.
 
     Raises UnreadableResultError for what is no run, and UsageError for one that has failed.
     """
     with open_result(path, kind="run") as result:
         if result.attributes.get("status") == "failed":
-            raise UsageError("has failed, and its last state is of no use; name a run that is done")
+            raise UsageError(f"{path}: has failed, and its last state is of no use; name a run that is done")
         try:
             case = Case.model_validate(parse(result.text("resolved_toml"), "its case"))
         except (CaseError, ValidationError) as error:
-            raise UnreadableResultError("holds no case of this version; run its case again") from error
+            what = f"{path}: holds no case of this version"
+            raise UnreadableResultError(f"{what}; run its case again") from error
         history = result.variables("history")
-        rows = {history[name].shape for name in ("time", *_STATE)}
-        if len(rows) != 1 or not (samples := rows.pop()[0]):
-            raise UnreadableResultError("has no history; run its case again")
+        shapes = {history[name].shape if name in history else (0,) for name in ("time", *_STATE)}
+        if len(shapes) != 1 or not (samples := shapes.pop()[0]):
+            raise UnreadableResultError(f"{path}: has no history; run its case again")
         time, *state = (float(result.read("history", name, samples - 1)[0]) for name in ("time", *_STATE))
-    return initial_at(case, system_of(case), time, state)
+    return End(case, time, state)
+
+
+def end_of(path: Path) -> dict[str, float]:
+    """The keys of `initial` at the end of a run: x, y (m), vx, vy (m/s) and wheel_angle (rad).
+
+    Raises what `last_of` raises.
+    """
+    end = last_of(path)
+    return initial_at(end.case, system_of(end.case), end.time, end.state)
 
 
 def initial_at(case: Case, system: System, time: float, state: list[float]) -> dict[str, float]:

@@ -46,11 +46,12 @@ def command(
     keys, low, high = parsed(parameter)
     loaded = load_case(case, overrides)
     target = result_path(output, case) if output is not None else None
-    from brakecli.files.atomic import new_output
+    from brakecli.branches.explore import Explorer
     from brakecli.files.field import values_of
     from brakecli.files.stability_fields import BRANCH
+    from brakecli.files.write import new_result
     from brakecli.front.stability_tables import branch_table
-    from brakecli.runs.branch import branch, line_of, start_of, write
+    from brakecli.runs.branch import branch, line_of, start_of, states_of, write
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
 
@@ -58,12 +59,14 @@ def command(
         with within_range():
             line = line_of(loaded, keys, low, high, f"--parameter {parameter}")
         units = unit(keys[0])
-        starts = [start_of(path, keys) for path in start or ()]
-        with new_output(target, force=force) if target else nullcontext():  # whether it can be written
+        states = states_of(line, [start_of(path, keys) for path in start or ()])
+        with new_result(target, force=force) if target else nullcontext():  # whether it can be written
             pass
+        explorer = Explorer(line, tell)  # up to here there is nothing to keep, and a signal ends it at once
         kept = f"what was followed up to here is in {target}" if target else ""
         with lastly(lambda: kept), signals_deferred() as waiting:
-            found = branch(line, tell, lambda: bool(waiting), starts, switch, pushes)
+            explorer.stop = lambda: bool(waiting)
+            found = branch(explorer, states, switch, pushes)
             hide_signals()  # from what writes the file
             if target:
                 write(target, loaded, found, units, force=force)

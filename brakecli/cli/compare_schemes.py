@@ -32,14 +32,14 @@ def command(
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps
     from brakecli.comparison.result import ComparisonReport, write
-    from brakecli.files.atomic import new_output
+    from brakecli.files.write import new_result
     from brakecli.front.tables import comparison_table
     from brakecli.runs.run import load_kernels
 
     chosen, ladder = parse_schemes(schemes), parse_steps(steps)
     system = load_kernels(loaded)
     with telling(quiet) as show_progress:
-        with new_output(target, force=force):  # whether it can be written is known before anything is computed
+        with new_result(target, force=force):  # whether it can be written is known before anything is computed
             pass
         found = compare(system, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)
         report = ComparisonReport(target, loaded.case, found, target_error)

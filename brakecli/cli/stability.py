@@ -18,6 +18,7 @@ from brakecli.cli.options import (
 )
 from brakecli.cli.output import show_result
 from brakecli.errors import UsageError, printable
+from brakecli.files.atomic import check_target
 from brakecli.front.inputs import load_case, result_path
 from brakecli.front.progress import say, telling
 
@@ -41,10 +42,12 @@ def command(
 ) -> None:
     """Critical friction, modes, least friction that vibrates."""
     axis = _parse_axis(vary) if vary is not None else None
-    if output is not None and (axis is None or output.suffix.lower() not in (".h5", ".csv")):
+    if output is not None and axis is None:
         raise UsageError(f"{output}: holds what --vary finds; give --vary, and a name that ends in .h5 or .csv")
     loaded = load_case(case, overrides)
     target = result_path(output, case, ending=".csv") if output is not None else None
+    if target is not None:
+        check_target(target, "what --vary finds", (".h5", ".csv"))
     from brakecli.analysis.stability.report import stability
     from brakecli.branches.thresholds import thresholds
     from brakecli.case.system import system_of

@@ -97,9 +97,13 @@ class OutputFile(FileIO):
 
 
 def check_target(target: Path, what: str, suffixes: Sequence[str], results: Iterable[Path] = ()) -> None:
-    """Raise UsageError where a target has the suffix of nothing that can be written, or is one of the results."""
-    if target.suffix.lower() not in suffixes:
-        problem = f"its suffix does not name {what} (found {target.suffix!r})"
+    """Raise UsageError where a target has the suffix of nothing that can be written, or is one of the results.
+
+    The same holds for the file that a symbolic link leads to.
+    """
+    ends = [suffix for name in (target, os.path.realpath(target)) for suffix in [Path(name).suffix]]
+    if wrong := [suffix for suffix in ends if suffix.lower() not in suffixes]:
+        problem = f"its suffix does not name {what} (found {wrong[0]!r})"
         named = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
         raise UsageError(f"{target}: {problem}; name a file that ends in {named} with {argument('output')}")
     for result in results:

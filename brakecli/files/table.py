@@ -4,11 +4,11 @@ A unit stands in a second line of names, in brackets behind a name, `height (mm)
 Whatever is wrong in the file is an UnreadableResultError.
 """
 
+import csv
 import re
-import warnings
-from collections.abc import Iterable
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
-from functools import cache, partial
+from functools import cache
 from io import BytesIO, TextIOWrapper
 from itertools import islice
 from pathlib import Path
@@ -26,6 +26,13 @@ Array = NDArray[Any]
 _COMMENTS = ("#", "%")
 LARGEST = 500_000_000  # bytes of a file of measured numbers
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
+_NEAR = 100  # lines of numbers from which the decimal sign is found
+_AT_ONCE = 10_000  # rows that become numbers together
+_DIGITS = 9  # of the number of a column: no file has more
+_QUOTED = re.compile(r'"[^"]*"')
+_COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
+_COMMENT = re.compile(r"[#%].*")
 _ONE = r"[^\W\d_]+|[°%]"  # name of a unit
 _LONGEST = 80  # characters of a unit
 _POWER = r"(?:\^?-?\d|⁻?[¹²³])?"  # bounded
@@ -36,6 +43,11 @@ def require(good: Any, problem: str) -> None:
     """Raise UnreadableResultError unless all is good."""
     if not good:
         raise UnreadableResultError(problem)
+
+
+def ordinal(text: str) -> int:
+    """The number of a column, from 1, that a text names; 0 where it names none."""
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= _DIGITS else 0
 
 
 class TextTable:
@@ -52,34 +64,60 @@ class TextTable:
             self._encoding = "utf-8-sig"
         except UnicodeDecodeError:
             self._encoding = "latin-1"
-        lines = head.decode(self._encoding, errors="replace").splitlines()
+        lines = [*TextIOWrapper(BytesIO(head), encoding=self._encoding, errors="replace")]
         lines = lines[:-1] if len(head) == _HEAD and len(lines) > 1 else lines
         self.names: list[str] = []
         self.units: list[str] = []  # as they are written in a line of their own
         self.header: list[str] = []  # the lines before the numbers
         self.places: list[int] = []  # the columns that were read last
         for self.skip, line in enumerate(lines):
-            if not line.strip() or line.lstrip().startswith(_COMMENTS):
-                self.header.append(line)
-                continue
-            self.separator = next((s for s in (";", "\t", ",") if s in line), None)  # None: white space
-            self.decimal_comma = self.separator != "," and "," in line
-            cells = self._cells(line)
-            numbers = [_is_number(cell, self.decimal_comma) for cell in cells]
-            self.columns = len(cells)
-            if any(numbers) and all(good or not cell for good, cell in zip(numbers, cells, strict=True)):
-                near = lines[self.skip : self.skip + 100]
-                self.decimal_comma |= self.separator != "," and any("," in text for text in near)
-                self._name()
-                return
+            if line.strip() and not line.lstrip().startswith(_COMMENTS):
+                bare = _QUOTED.sub("", line)
+                self.separator = next((s for s in (";", "\t", ",") if s in bare), None)  # None: white space
+                cells = self._cells(_COMMENT.sub("", line))
+                comma = any(map(_COMMA.fullmatch, cells))
+                numbers = [_number(cell, decimal_comma=comma) for cell in cells]
+                if any(cells) and None not in numbers:
+                    self.columns = len(cells)
+                    self._find_sign(lines[self.skip : self.skip + _NEAR])
+                    self._name()
+                    return
             self.header.append(line)
         raise UnreadableResultError("no line of numbers was found at its start; name a file of columns of numbers")
 
     def _cells(self, line: str) -> list[str]:
-        return [cell.strip().strip('"') for cell in line.lstrip("#% ").split(self.separator)]
+        return [cell.strip() for row in self._rows(iter([line.lstrip("#% ")])) for cell in row]
+
+    def _rows(self, lines: Iterator[str]) -> Iterator[list[str]]:
+        """The cells of lines; none of an empty line."""
+        if self.separator is None:
+            yield from ([cell.strip('"') for cell in line.split()] for line in lines)
+            return
+        reader = csv.reader(lines, delimiter=self.separator, skipinitialspace=True)
+        line = self.skip
+        try:
+            for row in reader:
+                line = self.skip + reader.line_num
+                yield row
+        except csv.Error as error:
+            what = f"behind line {line}: {error}"
+            raise UnreadableResultError(f"{what}; close what is quoted, and give every row a line") from error
+
+    def _find_sign(self, lines: list[str]) -> None:
+        """Find the decimal sign of the first lines of numbers."""
+        cells = (cell for line in lines for cell in self._cells(_COMMENT.sub("", line)))
+        commas = [cell for cell in cells if _COMMA.fullmatch(cell)]
+        self.decimal_comma = bool(commas)
+        parted = self.separator == "," and self.decimal_comma and all(map(_GROUPED.fullmatch, commas))
+        what = f"commas in {commas[0] if commas else ''} may part thousands, or be decimal signs"
+        require(not parted, f"line {self.skip + 1}: {what}; write numbers without them")
 
     def _name(self) -> None:
         """Take names and units of the last lines before the numbers that have a cell for each column."""
+        bare = [line for line in self.header if line.strip() and not line.lstrip().startswith(_COMMENTS)]
+        named = len(self._cells(bare[-1])) if bare and self.separator is not None else 1
+        short = f"the line before the numbers has {named} cells, and line {self.skip + 1} has {self.columns}"
+        require(named in (1, self.columns), f"{short}; give both the same, or begin the former with #")
         fitting = [(line, cells) for line in self.header if len(cells := self._cells(line)) == self.columns]
         rows = [cells for line, cells in fitting if not line.lstrip().startswith(_COMMENTS)]
         rows = (rows or [cells for _, cells in fitting])[-2:]
@@ -89,7 +127,7 @@ class TextTable:
 
     def numbers(self) -> list[Array]:
         """All columns."""
-        return list(self._read(list(range(self.columns))).T)
+        return self._read(list(range(self.columns)))
 
     def columns_of(self, column: str | None, time_column: str | None) -> list[Array]:
         """The chosen column, and the times where they are in a column."""
@@ -100,9 +138,7 @@ class TextTable:
         if len(values) != 1:
             raise UsageError(f"which column is the signal? give {argument('column')}; there are {there}")
         self.places = chosen = [*values, *times]
-        last = self.columns - 1
-        table = self._read(chosen if last in chosen else [*chosen, last])  # the last shows that rows are whole
-        return list(table.T[: len(chosen)])
+        return self._read(chosen)
 
     def _index(self, wanted: str, option: str, there: str) -> int:
         """Place of a column; a name comes before a number, and need not have its unit in brackets."""
@@ -112,8 +148,9 @@ class TextTable:
             raise UsageError(f"{option}: several columns are named {wanted}; give its number, from 1")
         if wanted in names:
             return names.index(wanted)
-        number = int(wanted) if wanted.isascii() and wanted.isdigit() else 0
-        require(1 <= number <= self.columns, f"{option}: there is no column {wanted}; there are {there}")
+        number = ordinal(wanted)
+        none = f"{option}: there is no column {printable(wanted)}; there are {there}"
+        require(1 <= number <= self.columns, none)
         return number - 1
 
     def unit(self, column: int, *wanted: str) -> tuple[float, str] | None:
@@ -138,33 +175,67 @@ class TextTable:
         require(len({*known.values()}) < 2, f"column {name}: has the units {' and '.join(known)}; keep one")
         return next(iter(known.values()), None)
 
-    def _read(self, columns: list[int]) -> Array:
-        """Some columns, by numpy's own reader; empty cells and decimal commas take it longer."""
-        load = partial(np.loadtxt, comments=_COMMENTS, delimiter=self.separator, usecols=columns, ndmin=2)
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            if not self.decimal_comma:
-                with suppress(ValueError, IndexError):  # perhaps because of an empty cell
-                    return load(self._lines())
-            lines = (line.replace(",", ".") for line in self._lines()) if self.decimal_comma else self._lines()
-            try:
-                return load(lines, converters=lambda cell: float(cell.strip().strip('"') or "nan"))
-            except (ValueError, IndexError) as error:
-                what = f"from line {self.skip + 1} on: {' '.join(str(error).split())}"
-                remedy = "give every row the same columns, and every cell a number, nothing or nan"
-                raise UnreadableResultError(f"{what}; {remedy}") from error
+    def _read(self, columns: list[int]) -> list[Array]:
+        """Some columns; every row is as long as the first one, and each cell holds a number, nothing or nan."""
+        rows, line = self._rows(self._lines()), self.skip
+        parts = [list[Array]() for _ in columns]
+        while some := list(islice(rows, _AT_ONCE)):
+            places: Sequence[int] = range(line + 1, line + 1 + len(some))
+            line += len(some)
+            if {*map(len, some)} != {self.columns} or self.columns == 1:
+                places = [place for place, row in zip(places, some, strict=True) if not self._is_blank(row, place)]
+                some = [some[place - line - 1] for place in places]  # from behind
+            for part, column in zip(parts, columns, strict=True):
+                part.append(self._column([row[column] for row in some], column, places))
+        return [np.concatenate(part) for part in parts]
 
-    def _lines(self) -> Iterable[str]:
-        """The lines from the first numbers on."""
-        return islice(TextIOWrapper(BytesIO(self._data), encoding=self._encoding), self.skip, None)
-
-
-def _is_number(cell: str, decimal_comma: bool) -> bool:
-    try:
-        float(cell.replace(",", ".") if decimal_comma else cell)
-    except ValueError:
+    def _is_blank(self, row: list[str], line: int) -> bool:
+        """Whether a row is an empty line; raises UnreadableResultError for one that is shorter or longer."""
+        if len(row) < 2 and not "".join(row).strip():
+            return True
+        what = f"line {line}: has {len(row)} cells, and the first line of numbers {self.columns}"
+        require(len(row) == self.columns, f"{what}; give every row the same columns")
         return False
-    return True
+
+    def _column(self, cells: list[str], column: int, lines: Sequence[int]) -> Array:
+        """The numbers of cells of a column, which stand in these lines."""
+        if _is_plain("".join(cells)) and not self.decimal_comma:
+            with suppress(ValueError):  # perhaps because of an empty cell
+                return np.array([*map(float, cells)])
+        numbers = list[float]()
+        for line, cell in zip(lines, cells, strict=True):
+            number = _number(cell, decimal_comma=self.decimal_comma)
+            if number is None:
+                what = f"line {line}, column {column + 1}: is no number (found {printable(cell.strip())!r})"
+                sign = ", with the decimal comma that others have" * self.decimal_comma
+                raise UnreadableResultError(f"{what}; give every cell a number{sign}, nothing or nan")
+            numbers.append(number)
+        return np.array(numbers)
+
+    def _lines(self) -> Iterator[str]:
+        """The lines from the first numbers on, without comments."""
+        lines = islice(TextIOWrapper(BytesIO(self._data), encoding=self._encoding), self.skip, None)
+        if any(sign.encode() in self._data for sign in _COMMENTS):
+            return (_COMMENT.sub("", line) for line in lines)
+        return lines
+
+
+def _is_plain(text: str) -> bool:
+    """Whether no character is there that Python takes for a part of a number, and nobody else."""
+    return text.isascii() and "_" not in text
+
+
+def _number(cell: str, *, decimal_comma: bool) -> float | None:
+    """The number of a cell, NaN if it is empty, None if it is none; a file has one decimal sign."""
+    text = cell.strip()
+    if decimal_comma:
+        text = "." if "." in text else text.replace(",", ".")
+    if not _is_plain(text):
+        return None
+    try:
+        return float(text or "nan")
+    except ValueError:
+        return None
 
 
 @cache

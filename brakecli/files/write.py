@@ -4,6 +4,7 @@ The same calls give the same bytes, however the rows of a growing variable are c
 """
 
 import math
+import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
@@ -254,10 +255,11 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
     """Begin a result file; unless `commit` is called within the block, nothing of it remains.
 
     Raises what `new_output` raises, before anything is computed, and UsageError where the file is no result: it
-    may be the case, or a profile that the case reads.
+    may be the case, or a profile that the case reads. Of a symbolic link the file counts that it leads to.
     """
     with suppress(OSError, ValueError):
-        if force and path.suffix != ".h5" and path.is_file() and path.stat().st_size and not is_hdf5(path):
+        target = Path(os.path.realpath(path))
+        if force and target.suffix != ".h5" and target.is_file() and target.stat().st_size and not is_hdf5(target):
             raise UsageError(
                 f"{path}: is no result, and is not replaced by one; "
                 f"choose another output with {argument('output')}"

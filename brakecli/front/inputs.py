@@ -111,10 +111,10 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
     target = output or Path((kind if source == "-" else Path(source).stem) + ending)
     if source != "-" and not is_result(source):
         refuse_source(target, source, kind)
-    if target.suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
+    suffix = Path(os.path.realpath(target)).suffix  # of a symbolic link that of the file that it leads to
+    if suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
         raise UsageError(
-            f"{target}: a result is HDF5, not {target.suffix}; "
-            f"name a file that ends in .h5 with {argument('output')}"
+            f"{target}: a result is HDF5, not {suffix}; name a file that ends in .h5 with {argument('output')}"
         )
     return target
 

@@ -1,7 +1,7 @@
 """The branches of a case along keys: looked at beforehand, followed, and written to a file."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -13,17 +13,16 @@ from brakecli.branches.explore import Explorer
 from brakecli.branches.line import ALONE, Line
 from brakecli.branches.told import Followed
 from brakecli.case.case import Case
-from brakecli.case.read import LoadedCase, key_path, parse_resolved
+from brakecli.case.read import LoadedCase, key_path
+from brakecli.case.restart import last_of
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, integer, values_of
-from brakecli.files.read import open_result
 from brakecli.files.valid import LARGEST
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
 from brakecli.solver.compile import Floats
-from brakecli.solver.motion import Counted
 
 MULTIPLIERS = 4
 EQUATIONS = ALONE | {"roughness"}
@@ -75,26 +74,13 @@ def parsed(text: str) -> tuple[tuple[str, ...], float, float]:
 
 
 def start_of(path: Path, keys: Sequence[str]) -> Start:
-    """The last state of a run, and the value of the keys in its case; raises UnreadableResultError."""
-    with open_result(path, kind="run") as result:
-        row = [float(result.read("history", name, -1)[0]) for name in ("x", "y", "vx", "vy")]
-        case = parse_resolved(result.text("resolved_toml"), f"{path} (its resolved case)").case
-    whole = Line(case, keys, -math.inf, math.inf)
-    return Start(np.array(row), whole.own)
+    """The last state of a run, and the value of the keys in its case; raises what `last_of` raises."""
+    end = last_of(path)
+    return Start(np.array(end.state), Line(end.case, keys, -math.inf, math.inf).own)
 
 
-def branch(
-    line: Line,
-    tell: Counted,
-    stop: Callable[[], bool],
-    starts: Sequence[Start] = (),
-    switch: bool = False,
-    pushes: int = 0,
-) -> Answers:
-    """Follow all branches of a line, and those that five times so many `pushes` come to.
-
-    `stop` ends the work and keeps what there is.
-    """
+def states_of(line: Line, starts: Sequence[Start]) -> list[tuple[float, Floats]]:
+    """Places of a line and the states there from which branches are begun; raises UsageError."""
     states = []
     for start in starts:
         value = line.own if start.value is None else start.value
@@ -104,7 +90,17 @@ def branch(
                 f"widen {argument('parameter')}"
             )
         states.append((line.place(value), start.state))
-    return Answers(Explorer(line, tell, stop).explore(states, switch, pushes), line.own)
+    return states
+
+
+def branch(
+    explorer: Explorer, states: Sequence[tuple[float, Floats]] = (), switch: bool = False, pushes: int = 0
+) -> Answers:
+    """Follow all branches of the line of an explorer, those that begin at some states as well.
+
+    Others are sought by five times so many `pushes`.
+    """
+    return Answers(explorer.explore(states, switch, pushes), explorer.line.own)
 
 
 def write(path: Path, loaded: LoadedCase, found: Answers, units: str, *, force: bool) -> None:

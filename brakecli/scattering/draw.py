@@ -3,18 +3,25 @@
 import numpy as np
 from scipy import stats
 
+from brakecli.errors import RefusedError, found
 from brakecli.scattering.study import SCRAMBLINGS, Study
 from brakecli.solver.compile import Floats
 
 _LEAST = 2.0**-53  # a probability: a normal value has no end
 _MOST_FOR_INDICES = 1 << 12  # samples of each of the two sets that indices compare
+MOST_SAMPLES = 1_000_000
+"""Samples of a study, a choice: a sample takes some 450 bytes, and so many know a probability to a thousandth."""
+MOST_VALUES = 20_000_000
+"""Values of all samples, those of the indices included; a choice, as one takes some 50 bytes."""
 
 
 def drawn(study: Study) -> Floats:
     """Values of the parameters: sets of samples, samples, parameters. Each set is a sequence of its own.
 
-    Samples become as many as the sequences need: a power of two in each for Sobol's.
+    Samples become as many as the sequences need: a power of two in each for Sobol's. Raises RefusedError where
+    they are too many.
     """
+    _refuse_many(study)
     count, many = len(study.parameter), -(-study.samples // SCRAMBLINGS)
     rngs = [np.random.default_rng([study.seed, number]) for number in range(SCRAMBLINGS)]
     if study.sampling == "random":
@@ -42,6 +49,22 @@ def for_indices(study: Study) -> Floats:
     for number in range(count):
         mixed[number, :, number] = b[:, number]
     return _values(study, np.concatenate([a[None], b[None], mixed]))
+
+
+def has_indices(study: Study) -> bool:
+    """Whether Sobol indices are computed; with correlations the share of one parameter is not its own."""
+    return study.indices_of != "none" and study.correlation is None
+
+
+def _refuse_many(study: Study) -> None:
+    """Raise RefusedError where samples and their values would take too much memory."""
+    given, keys = f"samples: are too many{found(study.samples)}", sum(len(each.paths) for each in study.parameter)
+    if study.samples > MOST_SAMPLES:
+        raise RefusedError(f"{given}; {MOST_SAMPLES} are the most, take fewer")
+    of_indices = min(study.samples, _MOST_FOR_INDICES) * (len(study.parameter) + 2) if has_indices(study) else 0
+    if (study.samples + of_indices) * keys > MOST_VALUES:
+        remedy = 'take fewer samples or keys, or set indices_of = "none"'
+        raise RefusedError(f"{given} for {keys} keys; {remedy}")
 
 
 def _values(study: Study, parts: Floats) -> Floats:

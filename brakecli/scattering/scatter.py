@@ -20,7 +20,7 @@ from brakecli.files.field import Field, values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
 from brakecli.scattering.answers import Indices, quantiles
-from brakecli.scattering.draw import drawn, for_indices
+from brakecli.scattering.draw import drawn, for_indices, has_indices
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.study import SCRAMBLINGS, LoadedStudy, Study
 from brakecli.solver.compile import Floats
@@ -121,8 +121,7 @@ def _listed(words: list[str]) -> str:
 def draw(loaded: LoadedStudy) -> Drawing:
     """Draw the samples of a study; raises CaseError where its keys do not fit its case."""
     study = loaded.study
-    wanted = study.indices_of != "none" and study.correlation is None
-    values, others = drawn(study), for_indices(study) if wanted else None
+    values, others = drawn(study), for_indices(study) if has_indices(study) else None
     beside = others is not None and study.method == "run" and study.indices_of != "squeal"
     together = [values] if others is None or beside else [values, others]
     tables = {"critical": _CRITICAL} if study.method == "run" else {}

@@ -1,6 +1,7 @@
 """A sweep from its plan to the finished result file: hand out tasks, keep what is finished, write."""
 
 import math
+import multiprocessing
 import os
 import time
 from collections import deque
@@ -91,11 +92,12 @@ def choose_engine(
 
     `scheduler` is its address, or a client or a cluster of dask. `in_caller`: a single worker is this process
     itself; in a script it must be asked for, or the time that a sweep takes would decide whether the script needs
-    a guard. `compute` is what it computes, in place of points.
+    a guard. A daemonic process, as the worker of a pool, may start none, and computes itself. `compute` is what it
+    computes, in place of points.
     """
     compute = compute or partial(compute_units, plan)
     if scheduler is None and scheduler_file is None:
-        if in_caller and jobs == 1:
+        if (in_caller and jobs == 1) or multiprocessing.current_process().daemon:
             return CallerEngine(compute)
         return LocalEngine(compute, crew(plan, jobs), spare=jobs is None and not in_caller)
     from brakecli.sweeps.workers.dask import ClusterEngine

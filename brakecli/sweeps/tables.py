@@ -1,6 +1,6 @@
 """A sweep file's tables: the axes of the grid, and the critical parameter that is sought at each point."""
 
-import math
+import sys
 from collections.abc import Iterator
 from typing import Annotated, Any, Literal
 
@@ -57,7 +57,8 @@ class Axis(Table):
     @property
     def numeric(self) -> bool:
         """Whether there are numbers along it."""
-        return all(type(value) in (int, float) and math.isfinite(value) for value in self.values or ())
+        largest = sys.float_info.max  # a whole number may be larger, and is no float then
+        return all(type(value) in (int, float) and -largest <= value <= largest for value in self.values or ())
 
     def value(self, place: int) -> Any:
         """The value at a place along the axis; both ends of a range are exact."""

@@ -335,3 +335,50 @@ def test_a_wrong_unit_in_the_file_is_the_files_fault_and_one_of_an_option_the_us
     path = str(written(tmp_path, "0,1\n1,2\n2,4\n"))
     with pytest.raises(UsageError, match="not in kilograms"):
         read_signal(path, Measurand.ACCELERATION, column="2", time_column="1", unit="kg")
+
+
+QUOTED = '"0,000050","0,123456"\n"0,000100","-0,5"\n"0,000150","1,25e-1"\n'
+
+
+@pytest.mark.parametrize("head", ["", "t,x\n", '"t","x"\n'])
+def test_quoted_decimal_commas_between_commas_are_numbers(tmp_path: Path, head: str) -> None:
+    signal = read(written(tmp_path, head + QUOTED), "2", "1")
+    assert signal.values.tolist() == [0.123456, -0.5, 0.125]
+    assert signal.interval == pytest.approx(5e-5)
+
+
+REFUSED = {
+    "a longer row": ("t,x\n0,1\n1,2,3\n2,4\n", "line 3: has 3 cells, and the first line of numbers 2"),
+    "a shorter row": ("t,x\n0,1\n\n1\n2,4\n", "line 4: has 1 cells, and the first line of numbers 2"),
+    "a longer row of white space": ("0 1\n1 2 3\n", "line 2: has 3 cells"),
+    "bare decimal commas": ("t,x\n0,5,1,25\n1,5,2,25\n", "has 2 cells, and line 2 has 4"),
+    "thousands": ('t,x\n0,"1,000"\n1,"2,500"\n', "line 2: commas in 1,000 may part thousands"),
+    "two decimal signs": (
+        "t;x\n0;1,5\n1;2.5\n",
+        r"line 3, column 2: is no number \(found '2\.5'\).* decimal comma",
+    ),
+    "Arabic digits": ("t,x\n0,1\n1,٢\n2,4\n", "line 3, column 2: is no number"),
+    "grouped digits": ("t,x\n0,1\n1,1_000\n2,4\n", r"line 3, column 2: is no number \(found '1_000'\)"),
+    "an open quote": ('t,x\n0,1\n1,"2\n' + "2,4\n" * 50_000, "behind line 2: field larger than field limit"),
+}
+
+
+@pytest.mark.parametrize("kind", REFUSED)
+def test_what_may_be_read_in_two_ways_is_refused_with_its_line(kind: str, tmp_path: Path) -> None:
+    text, said = REFUSED[kind]
+    with pytest.raises(UnreadableResultError, match=said):
+        read(written(tmp_path, text), "2", "1")
+
+
+def test_a_comment_behind_numbers_and_lines_that_are_empty_are_passed_over(tmp_path: Path) -> None:
+    signal = read(written(tmp_path, "t,x\n0,1 # first\n\n% between\n   \n1,2\n2,4\n"), "2", "1")
+    assert signal.values.tolist() == [1.0, 2.0, 4.0]
+
+
+def test_a_number_of_thousands_of_digits_is_no_column(tmp_path: Path) -> None:
+    path = written(tmp_path, "t,x\n0,1\n1,2\n2,4\n")
+    with pytest.raises(UnreadableResultError, match=r"--column: there is no column 9{79}…; there are t, x"):
+        read(path, "9" * 5000, "t")
+    wavfile.write(tmp_path / "s.wav", 1000, np.zeros((10, 2), np.int16))
+    with pytest.raises(UsageError, match="which channel is the signal"):
+        read(tmp_path / "s.wav", "9" * 5000)

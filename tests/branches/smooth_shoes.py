@@ -1,5 +1,6 @@
 """Random damped shoes on smooth pads, and their branches of limit cycles from flutter."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -21,7 +22,7 @@ from tests.examples import make
 
 FRICTION = "friction.coefficient"
 LARGE = 3e3  # times the first amplitude: a vibration that grows without bound
-SETTINGS = Settings(longest=0.25, points=2500, seconds=30.0)
+SETTINGS = Settings(longest=0.25, points=2500, seconds=math.inf)
 
 
 def drawn(seed: int) -> Iterator[tuple[Tables, float]]:

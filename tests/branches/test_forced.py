@@ -80,7 +80,7 @@ def test_motions_close_and_disturbances_grow_as_in_the_event_driven_scheme(many:
     for seed in range(9000, 9000 + many):
         _, line = line_of(seed)
         problem = Forced.along(line)
-        branch = both_ways(problem, begun(problem), Settings(points=40, insertions=0, seconds=60.0))
+        branch = both_ways(problem, begun(problem), Settings(points=40, insertions=0, seconds=math.inf))
         for point in some(branch, 2):
             if stretch(point) > 100.0:
                 continue
@@ -149,7 +149,7 @@ def test_the_critical_value_of_the_search_is_an_end_of_stability(many: int) -> N
     for seed in islice(seeds, many):
         tables, line = line_of(seed)
         problem = Forced.along(line)
-        branch = both_ways(problem, begun(problem), Settings(seconds=60.0))
+        branch = both_ways(problem, begun(problem), Settings(seconds=math.inf))
         ends = [each.p for each in branch.specials if each.kind in ("torus", "flip", "fold")]
         step = Critical(parameter=FRICTION, lower=line.low, upper=line.high, tolerance=1e-3 * line.high)
         found = search(step, Line(make(tables), [FRICTION], line.low, line.high))
@@ -285,10 +285,10 @@ def test_random_open_pads_end_for_a_reason() -> None:
             problem = Forced.along(line)
         except CaseError:
             continue
-        point = problem.grown(0.0, Settings(low=1e-3, first=0.05, longest=1.0, change=math.inf, seconds=10.0))
+        point = problem.grown(0.0, Settings(low=1e-3, first=0.05, longest=1.0, change=math.inf, seconds=math.inf))
         if point is None:
             continue
-        branch = follow(problem, point, 1.0, Settings(seconds=10.0))
+        branch = follow(problem, point, 1.0, Settings(seconds=math.inf))
         assert branch.ended[1].reason
         for each in some(branch, 2):
             if stretch(each) < 10.0:
@@ -323,7 +323,7 @@ def test_cycles_of_a_rough_shoe_begin_at_flutter_and_close(amplitude: float) -> 
     first = sliding.vibration(cycles, change)
     assert first is not None
     assert first.facts.frequency == pytest.approx(change.frequency, rel=1e-2)
-    branch = follow(cycles, first, None, Settings(seconds=30.0, points=400))
+    branch = follow(cycles, first, None, Settings(seconds=math.inf, points=400))
     assert branch.ended[1].kind == "range"
     for point in some(branch, 4):
         motion = point.facts

@@ -60,7 +60,7 @@ def test_they_are_those_of_the_branch_command_over_another_range(number: int) ->
     own = 0.5 * (least + critical.friction) if least is not None else critical.friction
     case = make(changed(tables, FRICTION, own))
     line = line_of(LoadedCase(case, "", ""), [FRICTION], 0.01 * own, 1.7 * critical.friction, "range")
-    whole = branch(line, lambda what, done, total: None, lambda: False)
+    whole = branch(Explorer(line, lambda what, done, total: None))
     found = found_of(changed(tables, FRICTION, own))
     assert found.critical == pytest.approx(whole.critical, rel=1e-9)
     assert (found.coexists_from is None) == (found.barrier is None) == (number == SUPERCRITICAL)

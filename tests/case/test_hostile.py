@@ -1,7 +1,6 @@
 """Files that are not cases, or cannot be read, are refused quickly and in plain words."""
 
 import io
-import math
 import sys
 import time
 from pathlib import Path
@@ -12,7 +11,7 @@ from brakecli.case.read import parse_case, read_text
 from brakecli.errors import CaseError
 from brakecli.files.toml_lines import LARGEST_STORED, LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from tests.case.examples import CONSTANT, change, messages, problems, put
-from tests.commands import TINY
+from tests.commands import SOON, TINY
 
 HOSTILE = {
     "5000 nested tables": "\n".join("[" + ".".join(["a"] * depth) + "]" for depth in range(1, 5000, 100)),
@@ -44,14 +43,11 @@ HOSTILE = {
 
 
 @pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
-def test_a_hostile_file_is_refused_within_half_a_second(text: str) -> None:
-    took = math.inf
-    for _ in range(3):  # a busy machine takes longer now and then
-        if took >= 0.5:
-            start = time.process_time()
-            assert problems(text)
-            took = time.process_time() - start
-    assert took < 0.5
+def test_a_hostile_file_is_refused_soon(text: str) -> None:
+    """What grows with the square of such a text takes minutes."""
+    start = time.process_time()
+    assert problems(text)
+    assert time.process_time() - start < SOON
 
 
 def test_a_key_of_more_than_32_parts_is_refused_and_one_of_32_is_only_unknown() -> None:

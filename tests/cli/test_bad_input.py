@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import LONG, TINY, brakecli, each, left_in, shell, variants
+from tests.commands import LONG, SOON, TINY, brakecli, each, left_in, shell, variants
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -77,11 +77,11 @@ def test_wrong_values_are_told_all_at_once_with_their_lines(tmp_path: Path) -> N
     ],
     ids=["nested", "deep", "nul", "marks", "utf-16", "latin-1"],
 )
-def test_hostile_texts_are_refused_as_fast_as_any_case(tmp_path: Path, text: str | bytes) -> None:
+def test_hostile_texts_are_refused_soon(tmp_path: Path, text: str | bytes) -> None:
     (tmp_path / "bad.toml").write_bytes(text if isinstance(text, bytes) else text.encode())
     done = brakecli("check", "bad.toml", cwd=tmp_path)
     done.told(2, "bad.toml")
-    assert done.seconds < 0.5
+    assert done.seconds < SOON
 
 
 def test_a_run_that_is_too_large_is_refused_with_its_size(here: Path) -> None:

@@ -250,8 +250,8 @@ from brakecli.branches import explore
 
 begin = explore.Explorer.__init__
 
-def interrupted(self, line, tell, stop, seconds=60.0):
-    begin(self, line, lambda what, done, total: os.kill(os.getpid(), signal.SIGINT) if done == 30 else None, stop)
+def interrupted(self, line, tell):
+    begin(self, line, lambda what, done, total: os.kill(os.getpid(), signal.SIGINT) if done == 30 else None)
 
 explore.Explorer.__init__ = interrupted
 from brakecli.__main__ import main
@@ -271,6 +271,32 @@ def test_an_interruption_leaves_a_whole_file_that_ends_in_budget(here: Path) -> 
     assert 10 < tree["branch_1"].sizes["point"] < 31
 
 
+LOOKING = """
+import os, signal
+from brakecli.branches import sliding
+
+look = sliding.Sliding._at
+
+def interrupted(self, p):
+    os.write(2, b".")
+    os.kill(os.getpid(), signal.SIGTERM)
+    return look(self, p)
+
+sliding.Sliding._at = interrupted
+from brakecli.__main__ import main
+main()
+"""
+
+
+def test_before_there_is_anything_to_keep_a_signal_ends_the_work_at_once(tmp_path: Path) -> None:
+    """At the first of the 65 places at which steady sliding is looked at: with many waves each takes long."""
+    case = str(ROOT / "cases" / "rough-partly-open.toml")
+    words = [sys.executable, "-c", LOOKING, "branch", case, *FRICTION, "-o", "cut.h5", "-q"]
+    done = subprocess.run(words, cwd=tmp_path, env=environment(), capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (143, ".brakecli: terminated\n")
+    assert not [*tmp_path.iterdir()]
+
+
 BEGINNING = """
 import os, signal, threading
 from brakecli.branches import forced
@@ -279,7 +305,7 @@ grown = forced.Forced.grown
 
 def interrupted(*arguments):
     os.kill(os.getpid(), signal.SIGTERM)
-    timer = threading.Timer(2.0, os._exit, [9])
+    timer = threading.Timer(20.0, os._exit, [9])
     timer.daemon = True
     timer.start()
     return grown(*arguments)

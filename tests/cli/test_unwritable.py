@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import TINY, Done, brakecli, left_in, shell
+from tests.commands import TINY, Done, brakecli, each, left_in, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -93,3 +93,36 @@ def test_a_deleted_working_directory_is_told(here: Path) -> None:
     shell(f"{gone} run {here}/tiny.toml", here).told(74, "tiny.h5: cannot write: no such file or directory")
     shell(f"{gone} new", here).told(74, "case.toml: cannot write: no such file or directory")
     shell(f"{gone} check {here}/tiny.toml", here).told(0)
+
+
+def test_of_a_symbolic_link_the_file_counts_that_it_leads_to(good: Path, here: Path) -> None:
+    """Its own name does not say what is lost; a link to a result is replaced as the result itself."""
+    (here / "r.h5").write_bytes((good / "tiny.h5").read_bytes())
+    (here / "precious.txt").write_text("mine")
+    (here / "precious").write_text("mine")
+    for suffix in ("h5", "png", "csv", "html"):
+        (here / f"ln.{suffix}").symlink_to("precious.txt")
+    (here / "bare.h5").symlink_to("precious")
+    sweep = 'case = "tiny.toml"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [10.0]\n'
+    (here / "s.toml").write_text(sweep)
+    vary = "friction.coefficient=0.1:0.5:3"
+    lines = [
+        ["run", "tiny.toml", "-o", "ln.h5"],
+        ["run", "tiny.toml", "-o", "bare.h5"],
+        ["sweep", "s.toml", "-j", "1", "-o", "bare.h5"],
+        ["branch", "tiny.toml", "--parameter", "friction.coefficient=0:1", "-o", "bare.h5"],
+        ["compare-schemes", "tiny.toml", "-o", "bare.h5"],
+        ["stability", "tiny.toml", "--vary", vary, "-o", "ln.csv"],
+        ["plot", "r.h5", "-o", "ln.png"],
+        ["export", "r.h5", "-o", "ln.csv"],
+        ["report", "r.h5", "-o", "ln.html"],
+    ]
+    for line, done in zip(lines, each(here, [[*line, "--force"] for line in lines]), strict=True):
+        name = line[-1]
+        found = "is no result" if name == "bare.h5" else "is HDF5, not .txt" if name == "ln.h5" else "found '.txt'"
+        done.told(2, name, found)
+    assert {(here / name).read_text() for name in ("precious", "precious.txt")} == {"mine"}
+    (here / "latest.h5").symlink_to("r.h5")
+    brakecli("run", "tiny.toml", "-o", "latest.h5", "--force", "-q", cwd=here).told(0)
+    assert (here / "latest.h5").is_symlink()
+    assert (here / "r.h5").read_bytes() == (good / "tiny.h5").read_bytes()

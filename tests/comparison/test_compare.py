@@ -56,13 +56,13 @@ def smooth(friction: float = 0.5, **changes: Any) -> Case:
 
 @cache
 def smooth_comparison() -> Comparison:
-    return compare(system_of(smooth()), steps=STEPS, budget=60.0)
+    return compare(system_of(smooth()), steps=STEPS, budget=600.0)
 
 
 @cache
 def rough_comparison() -> Comparison:
     case = make(ROUGH, solver__duration=0.004, contact__nodes=64)
-    return compare(system_of(case), schemes=["two-layer"], steps=[2e-5, 5e-6], budget=60.0)
+    return compare(system_of(case), schemes=["two-layer"], steps=[2e-5, 5e-6], budget=600.0)
 
 
 def entries_of(found: Comparison, scheme: str, theta: tuple[float, ...], **fields: str) -> list[Entry]:

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from scipy.stats import binom
 
-from benchmarks.statistics.prices import FACTOR, RIGHT, SEED, priced
+from benchmarks.statistics.prices import RIGHT, SEED, priced
 from brakecli.case.case import resolved_toml
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -24,6 +24,8 @@ from tests.campaign import campaign
 from tests.examples import ROUGH, SQUEAL, make
 
 CASES = 20
+BUSY = 20.0
+"""By which times may differ that are about the same, on a machine that does something else in between."""
 
 
 def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is_refused_if_they_take_days(
@@ -73,7 +75,7 @@ def test_a_run_that_is_given_up_is_priced_by_its_progress_and_runs_that_keep_a_t
     assert begun is not None
     assert by_runs is not None
     assert begun.steps == by_runs.steps == steps.steps
-    assert 1.0 / FACTOR < begun.seconds / by_runs.seconds < FACTOR
+    assert 1.0 / BUSY < begun.seconds / by_runs.seconds < BUSY
     promise = {"solver__step": None, "solver__scheme": "two-layer", "solver__tolerance": 1e-8}
     ladder = measured(system_of(make(SQUEAL, solver__duration=1.0, **promise)))
     assert ladder is not None
@@ -93,7 +95,7 @@ def test_many_samples_are_priced_with_their_file_and_their_verdict(
     said = check(load_kernels(loaded), begin=True)
     begin = time.process_time()
     run(loaded, tmp_path / "r.h5", force=False)
-    assert 1.0 / FACTOR < said.seconds / (time.process_time() - begin) < FACTOR
+    assert 1.0 / BUSY < said.seconds / (time.process_time() - begin) < BUSY
 
 
 @pytest.mark.parametrize("scheme", ["piecewise-exact", "event-driven", "two-layer"])

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 import brakecli
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.restart import end_of
-from brakecli.errors import CaseError
+from brakecli.errors import BrakecliError, CaseError
 from brakecli.files.read import open_result
+from brakecli.runs.branch import start_of
 from brakecli.runs.run import run
 from brakecli.sweeps.plan import parse_sweep
 from tests.campaign import campaign
@@ -159,10 +160,26 @@ def test_what_is_no_end_of_a_run_is_refused_with_one_sentence(tmp_path: Path) ->
     assert "truncated, damaged or was altered" in problem(path=part)
     part.write_text("no result")
     assert "this is not an HDF5 file" in problem(path=part)
+
+    def start() -> str:
+        with pytest.raises(BrakecliError) as caught:
+            start_of(whole, ["friction.coefficient"])
+        return str(caught.value)
+
     altered(whole, "status", "failed")
     assert "has failed, and its last state is of no use" in problem()
+    assert start() == f"{whole}: has failed, and its last state is of no use; name a run that is done"
     altered(whole, "status", "done")
+    before = whole.read_bytes()
+    with h5py.File(whole, "r+") as file:
+        for name in file["history"]:
+            file["history"][name].resize(0, axis=0)
+    assert "initial.from: has no history (found " in problem()
+    assert start() == f"{whole}: has no history; run its case again"
+    whole.write_bytes(before)
+    assert start_of(whole, ["friction.coefficient"]).state.tolist() == [*end_of(whole).values()][:4]
     altered(whole, "resolved_toml", "shoe.mass = -1")
     assert "holds no case of this version" in problem()
+    assert start() == f"{whole}: holds no case of this version; run its case again"
     altered(whole, "kind", "stability")
     assert "holds a result of kind 'stability'" in problem()

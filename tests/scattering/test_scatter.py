@@ -17,11 +17,12 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import resolved_toml
 from brakecli.case.system import system_of
 from brakecli.case.tables import json_schema
-from brakecli.errors import BrakecliError, CaseError, UsageError
+from brakecli.errors import BrakecliError, CaseError, RefusedError, UsageError
 from brakecli.files.read import open_result
 from brakecli.front.inputs import load_case, load_study
+from brakecli.scattering import draw
 from brakecli.scattering.answers import Indices, quantiles
-from brakecli.scattering.draw import drawn, for_indices
+from brakecli.scattering.draw import MOST_SAMPLES, drawn, for_indices
 from brakecli.scattering.study import SCRAMBLINGS, Parameter, Study
 from tests.campaign import campaign, counts
 from tests.commands import ROOT, TINY, left_in
@@ -561,3 +562,24 @@ def test_the_schema_of_studies_accepts_the_starter_and_no_unknown_key() -> None:
     text = resources.files("brakecli.case.starters").joinpath("scatter.toml").read_text(encoding="utf-8")
     validator.validate(tomllib.loads(text))
     assert not validator.is_valid(tomllib.loads(text.replace("samples", "sample")))
+
+
+def test_more_samples_than_memory_holds_are_refused_before_any_is_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def drawn_(*_: Any, seed: Any) -> None:
+        raise AssertionError("a sample was drawn")
+
+    monkeypatch.setattr(stats.qmc, "Sobol", drawn_)
+    path = write_study(tmp_path, FRICTION, ANGLE)
+    for samples in (MOST_SAMPLES + 1, 10_000_000, 10**300):
+        with pytest.raises(RefusedError, match=r"samples: are too many \(found .*\); 1000000 are the most"):
+            brakecli.scatter(path, {"samples": samples})
+    monkeypatch.setattr(draw, "MOST_VALUES", 4000)
+    with pytest.raises(RefusedError, match=r"samples: are too many \(found 2000\) for 2 keys; take fewer samples"):
+        brakecli.scatter(path, {"samples": 2000})
+    with pytest.raises(AssertionError, match="a sample was drawn"):
+        brakecli.scatter(path, {"samples": 200})
+    (tmp_path / "study.toml").write_text(path.read_text().replace("case =", "samples = 10000000\ncase ="))
+    command("scatter", "study.toml", cwd=tmp_path).told(3, "samples: are too many (found 10000000)")
+    assert left_in(tmp_path) == {"shoe.toml", "study.toml"}

@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from itertools import islice
+from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +11,7 @@ import tomli_w
 
 from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_sweep
+from brakecli.sweeps import pilot as clocked
 from brakecli.sweeps.cost import estimate
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.pilot import DRAWN, MOST, UNEVEN, Pilot, drawn
@@ -20,6 +21,14 @@ from tests.examples import ROUGH
 from tests.sweeps.helpers import axis, frictions, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
+
+
+@pytest.fixture(autouse=True)
+def _counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A clock that goes on by a millisecond each time it is asked: places take what is done there, not more."""
+    ticks = count(0.0, 1e-3)
+    monkeypatch.setattr(clocked, "process_time", lambda: next(ticks))
+
 
 PROMISED = ROUGH | {"solver": {"tolerance": 1e-3, "duration": 0.02}, "output": {"sample_interval": 2.5e-4}}
 

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 import brakecli
-from brakecli.errors import BrakecliError, CaseError
+from brakecli.errors import BrakecliError, CaseError, RefusedError
 from brakecli.files.read import open_result
+from brakecli.sweeps import listed as listed_points
 from brakecli.sweeps.journal import identity
+from brakecli.sweeps.listed import read_listed
 from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
@@ -165,3 +167,52 @@ def test_wrong_points_from_python(tmp_path: Path, points: Any, said: str) -> Non
     with pytest.raises(BrakecliError) as refused:
         brakecli.sweep(tmp_path / "tiny.toml", points=points, jobs=1)
     assert said in str(refused.value)
+
+
+def noted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[str]:
+    """The texts that a function of the module is called with from now on."""
+    texts, before = list[str](), getattr(listed_points, name)
+
+    def called(text: str) -> Any:
+        texts.append(text)
+        return before(text)
+
+    monkeypatch.setattr(listed_points, name, called)
+    return texts
+
+
+def test_a_table_of_too_many_keys_or_points_is_refused_while_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No more lines are read than it takes to know that, and no more keys are parsed than a line holds."""
+    parsed, values = noted(monkeypatch, "key_path"), noted(monkeypatch, "_value")
+    monkeypatch.setattr(listed_points, "MOST_VALUES", 1000)
+    keys = [f"a.b{number}" for number in range(3000)]
+    for plan, said in (
+        (f"{','.join(keys)}\n{','.join('1' * 3000)}\n", r"plan\.csv:1: 3000 keys are too many, 200 are the most"),
+        ("shoe.mass\n" + "1.0\n" * 9000, r"plan\.csv:1002: the points are too many: with 1 key 1000 are the most"),
+        ("shoe.mass,load.force\n" + "1.0,2.0\n" * 9000, r"plan\.csv:502: .* with 2 keys 500 are the most"),
+    ):
+        with pytest.raises(RefusedError, match=said):
+            listed(tmp_path, plan)
+    assert len(parsed) == 3
+    assert len(values) == 2000
+    for points in ({key: [1.0] for key in keys}, {"shoe.mass": np.ones(1001)}):
+        with pytest.raises(RefusedError, match=r"points: .* too many"):
+            brakecli.sweep(tmp_path / "tiny.toml", points=points, jobs=1)
+
+
+def test_each_key_of_a_table_is_parsed_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    parsed = noted(monkeypatch, "key_path")
+    keys = [f"a.b{number}" for number in range(100)]
+    (tmp_path / "plan.csv").write_text(f"{','.join(keys)}\n{','.join('1' * 100)}\n")
+    read_listed(tmp_path / "plan.csv", "s.toml", 1)
+    assert parsed == keys
+
+
+def test_a_line_without_end_is_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(listed_points, "LONGEST_LINE", 1000)
+    with pytest.raises(CaseError, match=r"plan\.csv:2: has 501 entries for 1 keys"):
+        listed(tmp_path, "shoe.mass\n" + "1," * 100_000)
+    with pytest.raises(CaseError, match=r"points: cannot be read .*null byte"):
+        write_sweep(tmp_path, 'points = "a\\u0000b.csv"')

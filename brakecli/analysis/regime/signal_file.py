@@ -20,7 +20,7 @@ from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.faces import argument
 from brakecli.files.opening import contents, opened
-from brakecli.files.table import LARGEST, TextTable, si
+from brakecli.files.table import LARGEST, TextTable, ordinal, si
 from brakecli.files.table import require as _require
 
 _SI = {
@@ -183,7 +183,7 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     _require(len(values) <= _MOST_SAMPLES, f"it has {len(values)} samples, {_MOST_SAMPLES} are the most; {_PART}")
     rows = np.atleast_2d(values.T)
     chosen = column or "1" * (len(rows) == 1)
-    number = int(chosen) if chosen.isascii() and chosen.isdigit() else 0
+    number = ordinal(chosen)
     if not 1 <= number <= len(rows):
         raise UsageError(
             f"which channel is the signal? give {argument('column')} NUMBER; there are {len(rows)}, from 1"
