@@ -143,7 +143,7 @@ def test_the_longest_run_is_the_limit_and_is_told() -> None:
 
 
 def test_a_budget_of_steps_ends_what_is_not_decided_and_counts_all_runs() -> None:
-    """Each run of these takes a thousand steps in a second: of 2, 4 and 8 s, in all 14,000, and 30,000 with 16 s."""
+    """A thousand steps for a second: runs of 2, 4 and 8 s take 14,000 in all, and with one of 16 s 30,000."""
     system, tried = replace(asked(system_of(make(EXACT))), duration=2.0), list[float]()
     judged = judge(replace(system, duration=0.05))
     open_ = replace(judged.verdict, decision=UNDECIDED)
