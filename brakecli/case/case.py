@@ -35,6 +35,7 @@ class Case(Table):
 
     needless: ClassVar = {
         ("initial", "from"): tuple(("initial", key) for key in Initial.model_fields if key != "from"),
+        ("solver", "duration"): (("solver", "budget"),),
         ("solver", "tolerance"): (("solver", "theta"), ("solver", "iteration"), ("contact", "evaluator")),
         **{
             ("roughness", side, key): tuple(("roughness", side, other) for other in needless)

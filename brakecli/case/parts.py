@@ -16,6 +16,12 @@ from brakecli.solver.schemes import SCHEMES, Scheme
 DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
 SETTLED: Literal["settled"] = "settled"
 """In place of a duration: the run goes on until its verdict is decided."""
+BUDGET, MOST_BUDGET = 100_000_000, 10**15
+"""Steps that a case may take in all until its verdict is decided, where it leaves that open, and the most.
+
+A choice: at 7 million given steps in a second, a quarter of a minute. A step on rough pads may take a hundred
+times as long, but runs to a tolerance have hardly more steps than samples, whose limit comes first. The most is
+beyond any machine."""
 _SECONDS = TypeAdapter[float](Positive, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
@@ -158,6 +164,9 @@ class Solver(Table):
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
     )
     duration: Duration = quantity("s", 'time to simulate, or "settled": until the verdict is decided')
+    budget: Annotated[int, Field(ge=1, le=MOST_BUDGET)] | None = quantity(
+        "1", f'steps that duration = "settled" may take in all, {BUDGET} if left out', None
+    )
     allow_unconverged: bool = described("whether a run goes on after a step that did not converge", False)
 
     def _fill(self) -> None:
@@ -165,6 +174,8 @@ class Solver(Table):
             self.__dict__["scheme"] = "two-layer"
         if "theta" not in self.model_fields_set:
             self.__dict__["theta"] = self.row.theta
+        if self.budget is None and getattr(self, "duration", None) == SETTLED:  # it may be missing
+            self.__dict__["budget"] = BUDGET
 
     @property
     def row(self) -> Scheme:
@@ -181,6 +192,9 @@ class Solver(Table):
         if self.step is not None and self.scheme == "auto":
             what = 'is given, but "auto" chooses the step'
             yield self.wrong("step", what, "leave scheme out, or give tolerance instead of step")
+        if self.budget is not None and getattr(self, "duration", SETTLED) != SETTLED:
+            what = f'is for duration = "{SETTLED}", but duration is a number'
+            yield self.wrong("budget", what, f'leave budget out, or set duration to "{SETTLED}"')
         row, count = self.row, len(self.row.theta)
         if row.own_steps:
             for key, neutral in (("theta", ()), ("iteration", "newton"), ("allow_unconverged", False)):

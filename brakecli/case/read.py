@@ -44,7 +44,7 @@ class LoadedCase:
 
 def with_duration(loaded: LoadedCase, seconds: float) -> LoadedCase:
     """The same, whose case is run for so many seconds."""
-    case = changed(loaded.case, solver={"duration": seconds})
+    case = changed(loaded.case, solver={"duration": seconds, "budget": None})
     return replace(loaded, case=case, resolved=resolved_toml(case))
 
 

@@ -45,7 +45,7 @@ def system_of(case: Case) -> System:
         initial=Initial(initial.x, initial.y, initial.vx, initial.vy, initial.at == "equilibrium"),
         interval=case.output.sample_interval,
         duration=float(f"{first:.1e}") if solver.duration == SETTLED else solver.duration,
-        settles=solver.duration == SETTLED,
+        budget=solver.budget or 0,
         method=Method(
             scheme=("event-driven" if rough else "piecewise-exact") if automatic else solver.scheme,
             theta=solver.theta,

@@ -8,6 +8,9 @@ from typing import Any
 
 import numpy as np
 
+LARGEST = 1e150
+"""Magnitude of numbers that say something: the squares of larger ones overflow. What is beyond it is missing."""
+
 
 @dataclass(frozen=True)
 class Field:
@@ -22,6 +25,7 @@ class Field:
     missing: Any = None  # what stands for a value that does not exist
     in_file: bool = True  # what changes from one run of the same case to the next stays outside
     group: str = ""  # of the file, whose attributes hold the items of an object
+    rising: bool = False  # whether it is an axis whose numbers increase, none of them missing
     rows: "tuple[Field, ...]" = ()  # the items of an object, or of each object in a list
 
     @property
@@ -44,19 +48,21 @@ class Field:
         return (self.at + self.name if self.at[-1:] in ("", ".") else self.at).split(".")
 
     def read(self, report: object) -> Any:
-        """The value that a report holds, as JSON writes it."""
+        """The value that a report holds, as JSON and files hold it."""
         value: Any = report
         for part in self._path:
             if value is not None:
                 value = value[part] if isinstance(value, dict) else getattr(value, part)
                 value = value() if callable(value) else value
+        if not self.rows and self.kind != "i8":
+            value = plain(value)
         if value is None:
             return self.missing
         if self.rows and isinstance(value, list | tuple):
             return [values_of(self.rows, each) for each in value]
         if self.rows:
             return values_of(self.rows, value)
-        return int(value) if self.kind == "i8" else plain(value)
+        return int(value) if self.kind == "i8" else value
 
 
 def labelled(name: str, units: str) -> str:
@@ -108,9 +114,12 @@ def flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def plain(value: Any) -> Any:
-    """A value as JSON holds it: enumerations are texts, complex numbers pairs, NaN in an array is None."""
+    """A value as JSON holds it: enumerations are texts, complex numbers pairs, NaN in an array is None.
+
+    So is a number that is too large to say anything. NaN alone stays, as a fault of whoever made it.
+    """
     if type(value) is float or value is None:  # most of them
-        return value
+        return None if value is not None and abs(value) > LARGEST else value
     if isinstance(value, str):
         return str(value)
     if isinstance(value, complex):
@@ -119,7 +128,7 @@ def plain(value: Any) -> Any:
         if value.dtype.kind == "S":
             return np.char.decode(value, "utf-8").tolist()
         if value.dtype.kind == "f":
-            value = np.where(np.isfinite(value), value.astype(object), np.array(None))
+            value = np.where(np.abs(value) <= LARGEST, value.astype(object), np.array(None))
         return value.tolist()
     if is_dataclass(value):
         value = vars(value)

@@ -98,7 +98,7 @@ ENERGY = (
 VIBRATION = (
     Field("start", "s", "start of an interval of vibration"),
     Field("end", "s", "its end"),
-    Field("frequency", "Hz", "frequency where vx is largest"),
+    Field("frequency", "Hz", "frequency where vx is largest; missing where it is not known"),
     Field("amplitude", "m", "half of peak to peak of x there"),
     Field("speed", "m/s", "speed of the wheel's surface there"),
 )
@@ -139,9 +139,15 @@ RUN = (
     Field("step", "s", "time step, after it was fitted to the sample interval", at="motion.system."),
     ratio("tolerance", "largest relative error of the histories that is asked for", "certificate."),
     integer("certified", "whether the error is certain to stay below the tolerance (0, 1)", "certificate."),
-    ratio("estimated_error", "relative error of the histories, where the case gives no step", "certificate."),
-    ratio("error_by_steps", "part of it by the steps, where a run knows its own error", "certificate.by_steps"),
-    ratio("error_by_nodes", "part of it by the contact's nodes, likewise", "certificate.by_nodes"),
+    ratio(
+        "estimated_error",
+        "relative error of the histories, where the case gives no step; missing where nothing is known of it",
+        "certificate.known_error",
+    ),
+    ratio(
+        "error_by_steps", "part of it by the steps, where a run knows its own error", "certificate.known_by_steps"
+    ),
+    ratio("error_by_nodes", "part of it by the contact's nodes, likewise", "certificate.known_by_nodes"),
     ratio(
         "error_amplification",
         "by how much the motion multiplies an error of its start, at most",
@@ -164,10 +170,10 @@ RUN = (
     Field("solve_seconds", "s", "time of the loop", at="motion.work.solve_seconds", in_file=False),
 )
 HISTORY = (
-    Field("time", TIME.units, TIME.long_name),
+    Field("time", TIME.units, TIME.long_name, rising=True),
     *(Field(name, q.units, q.long_name, "i1" if name == "state" else "f8") for name, q in QUANTITIES.items()),
 )
-FREQUENCY = Field("frequency", "Hz", "frequency")
+FREQUENCY = Field("frequency", "Hz", "frequency", rising=True)
 WELCH = (
     integer("first_sample", "number of the first sample used, from 0", "start"),
     integer("segments", "segments averaged"),
@@ -180,8 +186,8 @@ SPECTRUM = {
 }
 UNCONVERGED = (
     Field("event", "1", "steps that did not converge"),
-    Field("time", "s", "time of an unconverged step"),
-    Field("residual", "N", "residual of an unconverged step"),
+    Field("time", "s", "time of an unconverged step", rising=True),
+    Field("residual", "N", "residual of an unconverged step; missing where it is no number"),
 )
 EVENTS = (
     integer("event", "number of an event, from 0"),
@@ -192,7 +198,7 @@ EVENTS = (
 EARLIER = (integer("earlier", "number of earlier events, which are not kept"),)
 
 INTERVAL = integer("interval", "interval of vibration, from 0")
-WINDOW_TIME = Field("time", "s", "middle of a window of time")
+WINDOW_TIME = Field("time", "s", "middle of a window of time", rising=True)
 OVER_TIME = (
     Field("speed", "m/s", "speed of the wheel's surface"),
     Field("load_force", "N", "pressing force", at="load"),

@@ -142,9 +142,7 @@ class StoredResult:
                 return texts
             if values.dtype == np.float16:  # its squares are infinite from 256 on
                 values = values.astype(np.float64)
-            limit = valid.LARGEST_IN_HISTORY if group == "history" else valid.LARGEST
-            if values.dtype.kind == "f" and not (np.abs(values) <= limit).all():
-                raise ValueError(f"{where} holds values that are not finite, or too large")
+            valid.check_numbers(values, group, where)
             return values
 
     def _group(self, group: str) -> h5py.Group:
@@ -182,8 +180,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
                 what = f"{path}: holds a result of kind {printable(repr(its_kind))}, and {kind!r} is needed"
                 remedy = f"name the result of a {kind}, or see what this one holds by brakecli report or plot"
                 raise OtherKindError(f"{what}; {remedy}")
-            valid.check_variables(file, its_kind, length)
-            nodes = valid.tree(file)
+            nodes = valid.check_result(file, its_kind, length)
         yield StoredResult(path, file, stream, nodes, _Named(path, attributes), length, not state)
 
 

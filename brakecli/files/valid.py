@@ -13,12 +13,13 @@ from typing import Any
 import h5py
 import numpy as np
 from h5py import h5a, h5d, h5s, h5t, h5z
+from numpy.typing import NDArray
 
 from brakecli.errors import escaped
 from brakecli.files import fields, stability_fields
-from brakecli.files.field import Field
+from brakecli.files.field import LARGEST, Field
 
-LARGEST, LARGEST_IN_HISTORY = 1e300, 1e150  # magnitudes; the squares of the latter are finite
+LARGEST_SQUARE = 1e300  # magnitude in variables that hold squares, as spectra do
 BLOCK = 1 << 20  # rows read at a time
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")  # which neither XML nor TOML may hold
 _RATIO = 1100  # no filter of HDF5 makes data smaller than this
@@ -61,8 +62,7 @@ _VARIABLES = {  # the first of a kind has the length of all
     ("branch", "branch_*/special"): stability_fields.SPECIAL,
 }
 _OBJECTS = {f"/{each.group}": each for each in fields.RUN if each.group}  # whose items are attributes of a group
-_RISING = ("time", "frequency")
-_BRIEFEST = 1e-100  # between two of these: no case holds smaller numbers
+_BRIEFEST = 1e-120  # between two numbers of an axis: beyond what the smallest and largest of a case make
 _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}  # of netCDF-4
 
 
@@ -101,8 +101,37 @@ def check_variables(file: h5py.File, kind: str, length: int) -> None:
                 shape = shape[1:] if field is not fields.DIRECTION else shape[:1]
             if own[: len(own) - (len(np.dtype(field.kind).shape) if field.kind[0] == "(" else 0)] != shape:
                 raise ValueError(f"{where} has the shape {own}, and {axis} has {shape}")
-            if kind == "run" and name in _RISING and field not in (*fields.OVER_TIME, *fields.EVENTS):
-                _check_rising(node, where)
+            if field.rising:
+                for block in _blocks(node):
+                    check_rising(block, where)
+
+
+def check_result(file: h5py.File, kind: str, length: int) -> dict[str, Any]:
+    """All that is true of a result: whoever writes one makes sure of it, and whoever reads one relies on it.
+
+    Returns what `tree` does; raises ValueError. Numbers in variables are checked as they are written and read, by
+    `check_numbers`.
+    """
+    nodes = tree(file)
+    check_variables(file, kind, length)
+    for node in nodes.values():
+        if isinstance(node, h5py.Group):
+            attributes_of(node, kind)
+    return nodes
+
+
+def check_numbers(values: NDArray[Any], group: str, where: str) -> None:
+    """Raise ValueError for numbers of a variable that are not finite, or too large."""
+    largest = LARGEST if group == "history" else LARGEST_SQUARE
+    if values.dtype.kind == "f" and not (np.abs(values) <= largest).all():
+        raise ValueError(f"{where} holds values that are not finite, or too large")
+
+
+def check_rising(values: NDArray[Any], where: str) -> None:
+    """Raise ValueError for numbers along an axis that do not increase."""
+    check_numbers(values, "history", where)
+    if not (np.diff(values) > _BRIEFEST).all():
+        raise ValueError(f"{where} does not increase")
 
 
 def tree(file: h5py.File) -> dict[str, Any]:
@@ -283,7 +312,7 @@ def _fits(field: Field, value: Any) -> bool:
     """Whether an attribute is what was declared."""
     whole = isinstance(value, int)
     if field.kind[0] == "f":
-        return (whole or isinstance(value, float)) and abs(value) <= LARGEST_IN_HISTORY
+        return (whole or isinstance(value, float)) and abs(value) <= LARGEST
     if field.kind[0] == "i" or field.rows:
         return whole
     if field.kind != fields.OBJECT:
@@ -291,14 +320,6 @@ def _fits(field: Field, value: Any) -> bool:
     if field.units:
         return isinstance(value, np.ndarray)
     return isinstance(value, list) and all(isinstance(each, str) for each in value)
-
-
-def _check_rising(node: h5py.Dataset, where: str) -> None:
-    for block in _blocks(node):
-        if not np.isfinite(block).all() or np.abs(block).max(initial=0.0) > LARGEST_IN_HISTORY:
-            raise ValueError(f"{where} holds values that are not finite, or too large")
-        if not (np.diff(block) > _BRIEFEST).all():
-            raise ValueError(f"{where} does not increase")
 
 
 def _blocks(node: h5py.Dataset) -> Iterator[Any]:

@@ -16,8 +16,9 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brakecli.errors import UsageError
+from brakecli.errors import CannotWriteError, UsageError
 from brakecli.faces import argument
+from brakecli.files import valid
 from brakecli.files.atomic import OutputFile, new_output
 from brakecli.files.field import Field
 from brakecli.files.opening import is_hdf5
@@ -42,7 +43,8 @@ class _Variable:
 class ResultFile:
     """A result file that is being written. A group is named by its path, the root by ``/``.
 
-    NaN and infinities are refused with ValueError. Once a write has failed, every method raises CannotWriteError.
+    What readers would refuse is refused with ValueError, by the checks of `valid`, which are theirs. Once a write
+    has failed, every method raises CannotWriteError.
     """
 
     def __init__(self, output: OutputFile) -> None:
@@ -82,10 +84,10 @@ class ResultFile:
     def column(
         self, field: Field, dims: Sequence[str], values: ArrayLike, group: str = "/", **attributes: Any
     ) -> None:
-        """Write a variable whose numbers may be missing: None or NaN."""
+        """Write a variable whose numbers may be missing: None, NaN, or too large to say anything."""
         if field.kind == "f8":
             numbers = np.asarray(values, dtype=np.float64)
-            values = np.where(np.isnan(numbers), FILL, numbers)
+            values = np.where(np.abs(numbers) <= valid.LARGEST_SQUARE, numbers, FILL)
             attributes = {"_FillValue": np.array([FILL]), **attributes}
         self.variable(group, field, dims, values, **attributes)
 
@@ -106,7 +108,7 @@ class ResultFile:
                 raise ValueError(f"{group}/{name}: only a variable over one growing axis can grow")
             growing[name] = variable
             return
-        checked = _checked(f"{group}/{name}", values, field.kind)
+        checked = _checked(group, name, values, field.kind)
         if checked.dtype.kind == "S":
             attributes["_Encoding"] = "utf-8"  # by which xarray knows text from bytes
         with self._hdf5():
@@ -149,7 +151,8 @@ class ResultFile:
         if values.dtype.kind == "S":
             values = values.astype(h5py.string_dtype("utf-8", values.dtype.itemsize))
         elif values.dtype.kind == "f":
-            values = _finite(name, np.where(np.isnan(values), FILL, values))
+            values = np.where(np.isnan(values), FILL, values)
+            valid.check_numbers(values, "/", name)
         with self._hdf5():
             self._file[name][where] = values
 
@@ -159,7 +162,7 @@ class ResultFile:
         growing = self._growing[group]
         if rows.keys() != growing.keys():
             raise ValueError(f"{group}: needs {sorted(growing)}, got {sorted(rows)}")
-        blocks = {name: _checked(f"{group}/{name}", rows[name], growing[name].field.kind) for name in rows}
+        blocks = {name: _checked(group, name, rows[name], growing[name].field.kind) for name in rows}
         shape, *others = {block.shape for block in blocks.values()}
         if others or len(shape) != 1:
             raise ValueError(f"{group}: every variable needs the same number of rows")
@@ -185,13 +188,24 @@ class ResultFile:
         return np.concatenate([before, waiting[max(0, start - written) : max(0, stop - written)]])
 
     def commit(self) -> None:
-        """Finish the file and put it in its place; nothing can be written after that."""
+        """Finish the file and put it in its place; nothing can be written after that.
+
+        Raises CannotWriteError, too, where readers would refuse it, which is a fault of this program.
+        """
         with self._hdf5():
             for group, growing in self._growing.items():
                 for variable in growing.values():
                     if len(variable.waiting) or not variable.written:
                         self._write_rows(group, variable, len(variable.waiting))
             self._file.attrs["complete"] = 1
+        with self._hdf5():
+            self._file.flush()
+            try:
+                kind = str(valid.plain_attribute(self._file, "kind"))
+                valid.check_result(self._file, kind, self._output.seek(0, 2))
+            except ValueError as error:
+                what = f"{self._output.path}: is not written, as nothing could read it ({error})"
+                raise CannotWriteError(f"{what}; report the case, as this is a fault of the program") from error
         self.close()
         self._output.write(digest(self._output, self._output.seek(0, 2)))
         self._output.publish()
@@ -294,15 +308,15 @@ def _finite(name: str, values: ArrayLike) -> NDArray[Any]:
     return array
 
 
-def _checked(name: str, values: ArrayLike, kind: str) -> NDArray[Any]:
+def _checked(group: str, name: str, values: ArrayLike, kind: str) -> NDArray[Any]:
     """The values in the type of the file; a number that would not come back as it was is refused."""
-    array = np.asarray(values)
+    array, where = np.asarray(values), f"{group}/{name}"
     if array.dtype.kind == "U":
         text = np.char.encode(array, "utf-8")
         return text.astype(h5py.string_dtype("utf-8", max(1, text.dtype.itemsize)))
-    _finite(name, array)
+    valid.check_numbers(_finite(where, array), group, where)
     with np.errstate(all="ignore"):
         converted = array.astype(kind, copy=False)
     if not np.array_equal(converted, array):
-        raise ValueError(f"{name}: does not fit {np.dtype(kind)}")
+        raise ValueError(f"{where}: does not fit {np.dtype(kind)}")
     return converted

@@ -19,7 +19,7 @@ from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, integer, values_of
-from brakecli.files.valid import LARGEST
+from brakecli.files.valid import LARGEST_SQUARE
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
 from brakecli.solver.compile import Floats
@@ -141,4 +141,4 @@ def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> N
 
 def _finite(number: float) -> float:
     """A number, or that of the largest size that a file takes."""
-    return math.copysign(min(abs(number), LARGEST), number)
+    return math.copysign(min(abs(number), LARGEST_SQUARE), number)

@@ -14,6 +14,8 @@ from brakecli.solver.system import System
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 MISSED = 1.0000001
 """Least error, over the promised one, of a run that does not keep it."""
+NOTHING = 1.0
+"""Error of a history over its largest value from which on nothing is known of it."""
 DISPLACED = 64.0 * float(np.finfo(float).eps)
 """How far a replica starts away, over its distances: the roundings of 64² steps add up to that at random."""
 
@@ -31,12 +33,33 @@ class Certificate:
     by_nodes: float | None = None  # what nodes make of it,
     amplification: float | None = None  # and by how much the motion multiplies a disturbance of its start, at most
 
+    @property
+    def known_error(self) -> float | None:
+        """The estimated error; None where it says nothing, as it is as large as the motion."""
+        return _known(self.estimated_error)
+
+    @property
+    def known_by_steps(self) -> float | None:
+        """What steps make of it, likewise."""
+        return _known(self.by_steps)
+
+    @property
+    def known_by_nodes(self) -> float | None:
+        """What nodes make of it, likewise."""
+        return _known(self.by_nodes)
+
     def sentence(self) -> str:
         """The certificate in words."""
         if self.certified:
             return f"error at most {self.estimated_error:.1e}, by {self.method}"
         kept = f"up to {self.certified_until:.4g} s they keep it"
-        return f"{self.tolerance:g} cannot be certified: {self.method} give {self.estimated_error:.1e}; {kept}"
+        found = f"{self.known_error:.1e}" if self.known_error is not None else "no bound"
+        return f"{self.tolerance:g} cannot be certified: {self.method} give {found}; {kept}"
+
+
+def _known(error: float | None) -> float | None:
+    """An error that is less than the motion itself."""
+    return error if error is not None and error < NOTHING else None
 
 
 class Certified(NamedTuple):

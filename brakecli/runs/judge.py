@@ -11,6 +11,7 @@ from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.measure import Continued, Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
+from brakecli.files.field import LARGEST
 from brakecli.runs.certificate import Certificate
 from brakecli.runs.settled import Judged
 from brakecli.runs.tolerance import certify
@@ -86,6 +87,6 @@ def judged_in_memory(system: System, progress: Progress) -> Judged[Motion]:
 
 
 def refuse_overflow(rows: NDArray[np.float64]) -> None:
-    """Raise FloatingPointError where a sample is not finite."""
-    if not np.isfinite(rows).all():  # the loop bounds only the motion itself
+    """Raise FloatingPointError where a sample is not finite, or so large that no result holds it."""
+    if not (np.abs(rows) <= LARGEST).all():  # the loop bounds only the motion itself
         raise FloatingPointError("a force overflows")

@@ -71,6 +71,7 @@ def ladder(system: System) -> Generator[System, Motion, Certified]:
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
     nodes, steps, quadrature = first_nodes(system), _Axis(), _Nodes()
     before, finer, seconds, rounding = None, steps, 0.0, Rounding(0.0, system.sampled_duration, wanted)
+    steps_before = 0
     while True:
         rung = system.by(nodes=nodes << quadrature.doublings, step=first * 0.5**steps.doublings)
         rung = replace(rung, interval=max(1, every >> steps.doublings) * system.interval)
@@ -78,9 +79,12 @@ def ladder(system: System) -> Generator[System, Motion, Certified]:
         run = yield rung
         spent, failed = run.work.solve_seconds, run.work.failed
         if beside:
+            steps_before += beside.work.steps
             seconds, failed = seconds + beside.work.solve_seconds, failed or beside.work.failed
             rounding = rounding if failed else Rounding.of(beside, run, wanted)
         run.work.solve_seconds = seconds = seconds + spent
+        run.work.coarser_steps = steps_before
+        steps_before = run.work.all_steps
         if before is not None and not failed:
             finer.before, finer.last = finer.last, compare(before, run, rounding.until).error
         before = before if failed else run

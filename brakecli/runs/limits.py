@@ -157,7 +157,7 @@ def adjustments(system: System) -> list[str]:
         fitted = f"{system.step:.9g} s, {system.per_sample} to the sample interval of {interval:g} s"
         found.append(f"solver.step: reduced from {asked:g} s to {fitted}")
     if system.settles:
-        until = f"until the verdict is decided, up to {longest(system):.6g} s"
+        until = f"until the verdict is decided, up to {longest(system):.6g} s, or {system.budget:,} steps in all"
         found.append(
             f"solver.duration: {system.sampled_duration:.6g} s at first, then twice as long and so on, {until}"
         )

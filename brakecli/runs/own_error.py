@@ -89,12 +89,14 @@ def promised(
     It yields what is to be run, receives its motion, and returns the last one with its certificate. `safety` is
     what is promised, over the error that a run knows.
     """
-    wanted, duration, seconds = system.method.tolerance, system.sampled_duration, 0.0
+    wanted, duration, seconds, steps_before = system.method.tolerance, system.sampled_duration, 0.0, 0
     most = _FAR * wanted / safety
     for left in range(_MOST_RUNS, 0, -1):
         most = most if left > 1 else math.inf
         motion = yield replace(rung, most_error=most)
         seconds += motion.work.solve_seconds
+        motion.work.coarser_steps = steps_before
+        steps_before = motion.work.all_steps
         known = Known.of_run(motion)
         steps, by_nodes, both = known.of.max(axis=0).tolist()
         coarse = most < math.inf and motion.work.failure is Failure.COARSE

@@ -191,7 +191,7 @@ def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
     event, *columns = fields.UNCONVERGED
     result.axis("unconverged", event, np.arange(len(events)))
     for field, values in zip(columns, events.T, strict=True):
-        result.variable("unconverged", field, ("event",), np.nan_to_num(values, nan=np.finfo(float).max))
+        result.column(field, ("event",), values, "unconverged")
 
 
 def _write_events(result: ResultFile, track: Track) -> tuple[str, ...]:

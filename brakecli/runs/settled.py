@@ -13,14 +13,12 @@ from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.parts import SETTLED
 from brakecli.runs.certificate import Certificate
-from brakecli.runs.cost import beside_seconds, guessed
 from brakecli.solver.motion import Work
 from brakecli.solver.system import System
 
-MOST_SECONDS = 20.0
-"""Guessed time of the longest run that is tried: a minute of waiting at most, with those before it."""
 MOST_SAMPLES = 2_000_000
 """Samples of the longest run that is tried: a worker of a sweep holds them in memory, with half a GB."""
+_DIGITS = 2  # of a budget that is advised
 
 
 class Ends(Protocol):
@@ -51,39 +49,53 @@ class Settled(NamedTuple, Generic[M]):
 
 
 def longest(system: System) -> float:
-    """Duration (s) of the longest run that is tried: the first one times a power of two.
-
-    It goes by guesses and not by the clock, so that a case gives the same bytes wherever it runs.
-    """
-    seconds = guessed(system).seconds + beside_seconds(system)
-    times = min(MOST_SECONDS / seconds, MOST_SAMPLES / system.samples)
+    """Duration (s) of the longest run that is tried: the first one times a power of two."""
+    times = MOST_SAMPLES / system.samples
     return system.sampled_duration * 2.0 ** max(0, math.floor(math.log2(times)))
 
 
 def settled(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
     """The run of a system; of one that is to settle, the shortest that is decided, or the longest that helps.
 
-    A run that fails is not made longer, nor one that cannot keep its tolerance however fine its steps are: that
-    takes several runs each time.
+    It goes by counts and not by the clock, so that a case gives the same bytes wherever it runs. The first run is
+    made in any case. A run that fails is not made longer, nor one that cannot keep its tolerance however fine its
+    steps are: that takes several runs each time.
     """
-    part, most = system, longest(system) if system.settles else 0.0
+    if not system.settles:
+        return Settled(run(system), system)
+    part, most, taken = system, longest(system), 0
     while True:
         found = run(part)
-        verdict, failed, longer = found.verdict, found.motion.work.failed, 2.0 * part.sampled_duration
+        verdict, work = found.verdict, found.motion.work
+        taken += work.all_steps
+        needed = taken + 2 * work.all_steps  # for a run twice as long
         kept = found.certificate is None or found.certificate.certified or part.method.row.exact
-        if not verdict.unfinished or failed or not kept or longer > most:
+        longer = 2.0 * part.sampled_duration
+        if not verdict.unfinished or work.failed or not kept or longer > most or needed > system.budget:
             break
         part = replace(part, duration=longer)
-    if not system.settles:
-        return Settled(found, system)
-    part, after = replace(part, duration=part.sampled_duration, settles=False), f"{part.sampled_duration:.6g} s"
-    if failed:
+    seconds = part.sampled_duration
+    part = replace(part, duration=seconds, budget=0)
+    if work.failed:
         return Settled(found, part)
     if not verdict.unfinished and verdict.regime is not Regime.UNDECIDED:
-        return Settled(found, replace(part, notes=(*part.notes, f"solver.duration: {SETTLED} after {after}")))
-    why = "a longer run would not keep the tolerance"
+        note = f"solver.duration: {SETTLED} after {seconds:.6g} s"
+        return Settled(found, replace(part, notes=(*part.notes, note)))
     if not verdict.unfinished:
         why = "a longer run would not decide more"
+    elif not kept:
+        why = "a longer run would not keep the tolerance; a larger solver.tolerance lets it be longer"
     elif longer > most:
-        why = f"no more than {MOST_SAMPLES:,} samples, or some {MOST_SECONDS:g} s of computing, are tried"
-    return Settled(found, part, (f"solver.duration: not {SETTLED} after {after}; {why}",))
+        wider = f"an output.sample_interval above {part.interval:g} s lets it be longer"
+        why = f"no more than {MOST_SAMPLES:,} samples are tried; {wider}"
+    else:
+        enough = rounded_up(needed)
+        why = f"solver.budget is {system.budget:,} steps; solver.budget = {enough} lets it be twice as long"
+    tried = f"not {SETTLED} after {seconds:.6g} s, and {taken:,} steps in all"
+    return Settled(found, part, (f"solver.duration: {tried}; {why}",))
+
+
+def rounded_up(count: int) -> int:
+    """The least number of two digits and noughts that is not below a count."""
+    unit: int = 10 ** max(0, len(str(count)) - _DIGITS)
+    return -(-count // unit) * unit

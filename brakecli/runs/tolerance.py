@@ -74,6 +74,7 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
     other = _solved(replica(sparse).by(share=SHORTER * share), lambda samples: None)
     run.work.solve_seconds += other.work.solve_seconds
+    run.work.coarser_steps = other.work.steps
     apart = compare(run, other)
     error, failed = ROUNDING_MARGIN * apart.error, run.work.failed or other.work.failed
     certified = error <= wanted and not failed

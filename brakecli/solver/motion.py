@@ -78,6 +78,7 @@ class Work:
     failure: Failure = Failure.NONE
     failure_time: float | None = None  # s
     steps: int = 0
+    coarser_steps: int = 0  # of the runs before it that did not keep a tolerance, or showed that it does
     contact_evaluations: int = 0
     unconverged_steps: int = 0
     non_unique_steps: int = 0
@@ -93,6 +94,11 @@ class Work:
     def failed(self) -> bool:
         """Whether the run ended before its time, or is not worth having."""
         return self.failure is not Failure.NONE
+
+    @property
+    def all_steps(self) -> int:
+        """Steps of all runs that a tolerance has taken."""
+        return self.steps + self.coarser_steps
 
     @property
     def failure_sentence(self) -> str | None:

@@ -71,12 +71,17 @@ class System:
     interval: float
     duration: float
     method: Method
-    settles: bool = False  # whether `duration` is only the first that is tried
+    budget: int = 0  # steps until its verdict is decided, where `duration` is only the first that is tried
     notes: tuple[str, ...] = ()  # where surfaces come from, and how long a run has become
     tangents: bool = False  # whether a small disturbance is carried along with a motion
     tracked: bool = False  # whether the loop notes works of parts, and events
     start_error: tuple[float, float] | None = None  # of x and y, m; where given, the error is carried along
     most_error: float = math.inf  # relative to the motion so far, beyond which such a run ends
+
+    @property
+    def settles(self) -> bool:
+        """Whether it is to run until its verdict is decided."""
+        return self.budget > 0
 
     def by(self, **changes: Any) -> "System":
         """The same, with these changes of its method."""

@@ -14,7 +14,6 @@ from brakecli.case.restart import initial_at
 from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.files.valid import LARGEST
 from brakecli.runs.limits import Check, within_range
 from brakecli.runs.settled import Judged
 from brakecli.runs.together import TOGETHER, certify_together
@@ -141,8 +140,6 @@ def computed(
             with within_range():
                 found = search(critical, Line(point.case, [critical.parameter], critical.lower, critical.upper))
             values |= values_of(fields.CRITICAL, found)
-        if large := [name for name, each in values.items() if isinstance(each, float) and abs(each) > LARGEST]:
-            raise FloatingPointError(f"{large[0]} is too large for a result")
     except FAULTS as error:
         reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.decision import Excitation, Regime
-from brakecli.files.valid import LARGEST
+from brakecli.files.valid import LARGEST_SQUARE
 from brakecli.sweeps.plan import Plan
 
 
@@ -43,8 +43,10 @@ def unsound(plan: Plan, records: bytes, units: int) -> str:
 
 def _fits(name: str, values: NDArray[Any]) -> bool:
     """Whether points may have these values; numbers may be missing, counts not."""
-    if values.dtype.kind != "S":
-        return bool((values >= 0).all()) if values.dtype.kind == "i" else not (np.abs(values) > LARGEST).any()
+    if values.dtype.kind == "i":
+        return bool((values >= 0).all())
+    if values.dtype.kind == "f":
+        return not (np.abs(values) > LARGEST_SQUARE).any()
     with suppress(UnicodeDecodeError):
         texts = {each.decode() for each in np.unique(values).tolist()}
         return texts <= {*_KNOWN.get(name, texts)}

@@ -1,7 +1,10 @@
 """Rules between keys: each that is broken is reported at its key, also where other keys are wrong."""
 
+import tomllib
+
 import pytest
 
+from brakecli.case.parts import BUDGET
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.runs.limits import adjustments
@@ -79,6 +82,27 @@ def test_a_step_chooses_two_layer_and_none_leaves_the_choice() -> None:
     assert (kept.scheme, kept.step, kept.effective_tolerance) == ("auto", None, 1e-5)
     (line,) = messages(change(plain, ("[solver]", '[solver]\nscheme = "auto"')))
     assert 'solver.step: is given, but "auto" chooses the step' in line
+
+
+def test_a_budget_is_for_a_run_that_settles_and_stands_in_its_resolved_case() -> None:
+    open_ = change(CONSTANT, ("duration = 1.0", 'duration = "settled"'))
+    resolved = parse_case(open_, "case.toml").resolved
+    assert (
+        tomllib.loads(resolved)["solver"]["budget"] == parse_case(resolved, "again").case.solver.budget == BUDGET
+    )
+    few = parse_case(open_, "case.toml", ["solver.budget=1000"])
+    assert tomllib.loads(few.resolved)["solver"]["budget"] == 1000
+    assert parse_case(few.resolved, "again", ["solver.duration=2.0"]).case.solver.budget is None
+    both = ['solver.duration="settled"', "solver.budget=7"]
+    for order in (both, both[::-1]):
+        assert parse_case(CONSTANT, "case.toml", order).case.solver.budget == 7
+    (line,) = messages(change(CONSTANT, ("duration = 1.0", "duration = 1.0\nbudget = 1000")))
+    assert 'solver.budget: is for duration = "settled", but duration is a number (found 1000)' in line
+    assert line.endswith('leave budget out, or set duration to "settled"')
+    for wrong in ("0", "-1", "1.5", "true", '"many"'):
+        (line,) = messages(change(open_, ('"settled"', f'"settled"\nbudget = {wrong}')))
+        assert " solver.budget: " in line
+    assert "budget" not in tomllib.loads(parse_case(CONSTANT, "case.toml").resolved)["solver"]
 
 
 def test_nodes_are_chosen_by_the_tolerance() -> None:

@@ -1,6 +1,7 @@
 """A run that is long enough by itself ends where its verdict is decided; a case with that duration repeats it."""
 
 import math
+import re
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -14,6 +15,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.branches.thresholds import thresholds
 from brakecli.case.case import Case, resolved_toml
+from brakecli.case.parts import MOST_BUDGET
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.files.read import open_result
@@ -140,6 +142,62 @@ def test_the_longest_run_is_the_limit_and_is_told() -> None:
     assert "solver.duration: not settled after" in found.warnings[0]
 
 
+def test_a_budget_of_steps_ends_what_is_not_decided_and_counts_all_runs() -> None:
+    """A thousand steps for a second: runs of 2, 4 and 8 s take 14,000 in all, and with one of 16 s 30,000."""
+    system, tried = replace(asked(system_of(make(EXACT))), duration=2.0), list[float]()
+    judged = judge(replace(system, duration=0.05))
+    open_ = replace(judged.verdict, decision=UNDECIDED)
+
+    def run(part: System) -> Judged[Motion]:
+        tried.append(part.duration)
+        steps = int(800 * part.duration)
+        work = replace(judged.motion.work, steps=steps, coarser_steps=steps // 4)
+        return judged._replace(verdict=open_, motion=replace(judged.motion, work=work))
+
+    (warning,) = settled(replace(system, budget=29_999), run).warnings
+    assert tried == [2.0, 4.0, 8.0]
+    assert warning.startswith("solver.duration: not settled after 8 s, and 14,000 steps in all; ")
+    assert warning.endswith("solver.budget is 29,999 steps; solver.budget = 30000 lets it be twice as long")
+    tried.clear()
+    settled(replace(system, budget=30_000), run)
+    assert tried == [2.0, 4.0, 8.0, 16.0]
+
+
+def test_what_does_not_settle_says_which_limit_it_has_met_and_what_would_help() -> None:
+    system = asked(system_of(make(EXACT)))
+    judged = judge(replace(system, duration=0.05))
+    open_ = judged._replace(verdict=replace(judged.verdict, decision=UNDECIDED))
+    (warning,) = settled(replace(system, budget=MOST_BUDGET), lambda part: open_).warnings
+    assert f"no more than {MOST_SAMPLES:,} samples are tried; " in warning
+    assert warning.endswith("an output.sample_interval above 0.0001 s lets it be longer")
+
+
+def test_a_measured_profile_gives_up_at_its_budget_and_goes_on_with_the_one_that_is_advised(
+    tmp_path: Path,
+) -> None:
+    """A turn of the wheel in steps of a degree: eccentric, of three waves, and with noise of a micrometre."""
+    angle, chance = np.radians(np.arange(360.0)), np.random.default_rng(7)
+    height = 20.0 * np.sin(angle) + 8.0 * np.sin(3.0 * angle + 1.0) + chance.standard_normal(360)
+    rows = (f"{place:.6f},{micrometres:.4f}" for place, micrometres in zip(0.5 * angle, height, strict=True))
+    (tmp_path / "runout.csv").write_text("\n".join(["s_m,h_um", *rows]) + "\n")
+    text = OPEN.replace("step = 1e-5, ", "").replace("angular_speed = 0.1", "angular_speed = 4.0")
+    text = text.replace("output.sample_interval = 1e-4", f'roughness.wheel.profile = "{tmp_path}/runout.csv"')
+
+    def with_budget(steps: int) -> Settled[Motion]:
+        return settle(parse_case(text, "case", ["friction.coefficient=0.3", f"solver.budget={steps}"]).case)
+
+    first = with_budget(1)
+    (warning,) = first.warnings
+    assert first.judged.verdict.unfinished
+    advised = re.search(r"and ([\d,]+) steps in all; .*; solver\.budget = (\d+) lets it be twice as long", warning)
+    assert advised is not None
+    tried, enough = (int(each.replace(",", "")) for each in advised.groups())
+    assert tried == first.judged.motion.work.all_steps >= first.judged.motion.work.steps
+    second = with_budget(enough)
+    assert second.system.duration == pytest.approx(2.0 * first.system.duration, rel=1e-3)
+    assert len(first.system.wheel.g) > 100
+
+
 DAMPED = Decision("decays", Regime.DAMPED)
 BLANK = Verdict(DAMPED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, {})
 UNDECIDED = Decision("grows", longer=True)
@@ -221,8 +279,8 @@ def test_check_tells_how_long_a_run_may_become_and_a_number_is_not_touched() -> 
     system = system_of(make(EXACT))
     found = check(system)
     assert found.at_least
-    assert f"up to {longest(system):.6g} s" in found.adjustments[0]
-    assert settled(replace(system, settles=False), judge).system.duration == system.duration
+    assert f"up to {longest(system):.6g} s, or 100,000,000 steps in all" in found.adjustments[0]
+    assert settled(replace(system, budget=0), judge).system.duration == system.duration
 
 
 def test_advice_is_checked_by_a_run_that_settles() -> None:
