@@ -116,10 +116,13 @@ EXPONENT = within(
     Field(
         "lyapunov_exponent",
         "1/s",
-        "on a rough wheel, speed and load constant: growth rate of small disturbances in the second half; missing "
-        "where the level still changes",
+        "on a rough wheel, speed and load constant: growth rate of small disturbances in the second half",
     ),
-    Field("lyapunov_error", "1/s", "standard error of that rate, with the drift of what has not settled"),
+    Field(
+        "lyapunov_error",
+        "1/s",
+        "standard error of that rate, with the drift of what has not settled",
+    ),
 )
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),

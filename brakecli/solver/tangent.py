@@ -66,7 +66,7 @@ def exponents(logs: Floats, duration: float) -> list[Exponent]:
     late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
     rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
     longer = np.diff(late.reshape(BATCHES // 2, 2, -1).mean(axis=1), axis=0) * (BATCHES / duration)
-    errors = np.maximum(_error_of_mean(rates), _error_of_mean(longer))
+    errors = np.maximum(*(each.std(axis=0, ddof=1) / math.sqrt(len(each)) for each in (rates, longer)))
     lined = sizes[len(sizes) // 8 :]
     places = (np.arange(len(lined)) - 0.5 * (len(lined) - 1)) * (duration / len(sizes))
     slopes = places @ lined / (places @ places)
@@ -75,17 +75,6 @@ def exponents(logs: Floats, duration: float) -> list[Exponent]:
     alike = ((places[:, None] * rest).reshape(-1, ALIKE, rest.shape[1]).sum(axis=1) ** 2).sum(axis=0)
     off = np.sqrt(np.maximum(apart, alike)) / (places @ places)
     return [Exponent(*each) for each in np.stack([rates.mean(axis=0), errors, slopes, off], axis=1).tolist()]
-
-
-def _error_of_mean(rates: Floats) -> Floats:
-    """The standard error of the mean of n rates between means over neighbouring batches.
-
-    Where the size of a disturbance walks at random, by D in the time of a batch, such a rate has the variance
-    2 D / 3 and their mean D (n - 1/3) / n²: (3 n - 1) / 2 n times that of n rates that know nothing of each other.
-    """
-    n = len(rates)
-    found: Floats = rates.std(axis=0, ddof=1) * math.sqrt((3 * n - 1) / (2 * n) / n)
-    return found
 
 
 def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:

@@ -54,10 +54,8 @@ def test_an_exponent_of_what_has_not_settled_has_the_drift_in_its_error() -> Non
 
 
 @pytest.mark.parametrize("seed", [12, pytest.param(28, marks=campaign)])
-def test_a_level_that_surely_changes_has_no_exponent(seed: int) -> None:
-    """It grows by e^0.3 in the second half of the run; eight times later the exponent is another one."""
-    tables = rough_shoe(seed)
-    assert disagree(tables) == 0
+def test_a_longer_run_has_an_exponent_within_the_errors(seed: int) -> None:
+    assert disagree(rough_shoe(seed)) == 0
 
 
 @campaign

@@ -185,8 +185,10 @@ def answers(shown: Shown) -> Answers:
         "settled": seen.settled_from > 0,
         "seconds": (shown.samples - shown.judged_from) * shown.interval,
     }
-    if exponent is not None and _lasts(shown, Answers(**found)):
-        found["exponent_error"] = math.hypot(exponent.error, 0.0 if found["settled"] else shown.drift())
+    if exponent is not None:
+        drift = 0.0 if found["settled"] else shown.drift()
+        passing = 0.0 if _lasts(shown, Answers(**found)) else max(exponent.rate, 0.0)  # what grows on the way only
+        found["exponent_error"] = math.hypot(exponent.error, drift, passing)
     if (theory := shown.linear) is not None:
         found |= {"linear": True, "ringing": theory.mode.frequency}
         if math.isfinite(theory.known_to):  # otherwise only neighbours tell
@@ -199,9 +201,13 @@ def answers(shown: Shown) -> Answers:
 
 
 def _lasts(shown: Shown, found: Answers) -> bool:
-    """Whether disturbances will grow as they do: they fade from a linear motion, or the level does not change."""
-    theory = shown.linear
-    return (theory is not None and theory.direction < 0) or steady(found, shown.limits)
+    """Whether disturbances will grow as they do: they fade from a linear motion, or the level does not change.
+
+    Over windows it may change with the waves that pass in them, and not over quarters.
+    """
+    theory, limits = shown.linear, shown.limits
+    fades = theory is not None and theory.direction < 0
+    return fades or steady(found, limits) or shown.changes() <= limits.settled_within
 
 
 def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
