@@ -147,6 +147,7 @@ class Forced(Doubled):
             by_u[k, :, (k + 1) % m] -= np.eye(4)
         gap = (found.ends - np.roll(u.reshape(m, 4), -1, axis=0)).ravel()
         by_p = self._by_p(u, p, found) if with_parameter else None
+        facts = self._facts(u, p, found)
         if with_parameter and by_p is None:
             return "the derivative by the parameter meets a border, or the end of what is valid"
         return Seen(
@@ -155,8 +156,9 @@ class Forced(Doubled):
             by_p,
             maps,
             found.word,
-            self._facts(u, p, found),
+            facts,
             self._margins(p, found),
+            facts.amplitude / float(scales[0]),
         )
 
     def _facts(self, u: Array, p: float, found: _Flown) -> Orbit:

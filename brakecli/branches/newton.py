@@ -48,7 +48,7 @@ class Settings:
     near: float = 1e-5
     """Correction that is the last one; the error left is of the order of its square.
 
-    Multipliers and facts are those of the place before it.
+    Multipliers and facts are those of the place before it. Of a motion smaller than one it is such a part.
     """
     exact: float = 1e-9
     """Correction that is the last one where a special point is located."""
@@ -114,7 +114,6 @@ class Newton:
         matrix[n], right[n, 1] = normal, 1.0
         z, last, before, lever = guess.copy(), math.inf, math.inf, 1.0
         by_p, word, taken = None, None, z
-        near = settings.exact if exact else settings.near
         slack = ROUNDING * (settings.high - settings.low)
         for _ in range(most or settings.iterations):
             if not settings.low - slack <= z[n] <= settings.high + slack:
@@ -135,6 +134,7 @@ class Newton:
             right[:n, 0], right[n, 0] = -seen.gap, normal @ (guess - z)
             step, tangent, length = self._solution(matrix, right)
             size = float(np.abs(step).max())
+            near = settings.exact if exact else max(settings.near * min(seen.size, 1.0), settings.exact)
             if not size <= settings.trust or not length < math.inf:
                 break
             # rounding of the gap may keep corrections from becoming still smaller

@@ -36,6 +36,8 @@ class Seen(NamedTuple):
 
     They are optional. With them a word that holds only between two neighbouring points is found as well.
     """
+    size: float = 1.0
+    """Of the motion, in the unit of the unknowns: of one that is smaller, facts are known to a part of it."""
 
 
 NEARER = 0.03

@@ -112,14 +112,17 @@ VIBRATIONS = Field(
     rows=VIBRATION,
 )
 EXPONENT = within(
-    "motion.exponent.",
+    "verdict.",
     Field(
         "lyapunov_exponent",
         "1/s",
         "on a rough wheel, speed and load constant: growth rate of small disturbances in the second half",
-        at="rate",
     ),
-    Field("lyapunov_error", "1/s", "standard error of that rate", at="error"),
+    Field(
+        "lyapunov_error",
+        "1/s",
+        "standard error of that rate, with the drift of what has not settled",
+    ),
 )
 RUN = (
     Field("status", "", "how the run has ended: done or failed", TEXT),

@@ -11,6 +11,10 @@ STABILITY = (
     Field("belt_speed", "m/s", "speed U of the wheel's surface"),
     ratio("friction_coefficient", "friction coefficient φ of the case", "friction"),
     ratio("critical_friction", "least friction coefficient at which stability ends", "critical.friction"),
+    ratio(
+        "critical_error",
+        "by which the mean over the waves leaves `critical_friction` open; null where not known",
+    ),
     Field("instability", "", "how stability is lost: flutter or divergence", TEXT, "critical."),
     Field("critical_frequency", "Hz", "frequency of the mode that becomes unstable", at="critical.frequency"),
     Field("stable", "", "whether steady sliding is stable at φ", "?"),
@@ -20,6 +24,7 @@ STABILITY = (
     ratio("undamped_flutter_friction", "φ of flutter without dashpots", "undamped_flutter"),
     ratio("undamped_divergence_friction", "φ of divergence without dashpots", "undamped_divergence"),
     Field("contact_stiffness", "N/m", "mean stiffness of the contact in steady sliding"),
+    Field("contact_stiffness_error", "N/m", "by which the mean over the waves leaves that open"),
     Field("equilibrium", "", "steady sliding; null where there is none", OBJECT),
     Field("no_equilibrium", "", "why there is no steady sliding", TEXT),
     Field("discrete", "", "stability of the difference scheme at its step", OBJECT),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
 
 from brakecli.analysis.stability.advice import rounded
@@ -44,8 +45,8 @@ def stability_table(
     rows = [
         ("surface speed U", text_of(report.belt_speed, "m/s")),
         ("steady sliding", sliding),
-        ("contact stiffness K", text_of(report.contact_stiffness, "N/m")),
-        ("critical friction", _crossing(critical) if critical else "none"),
+        ("contact stiffness K", text_of(report.contact_stiffness, "N/m") + _bar(report.contact_stiffness_error)),
+        ("critical friction", _crossing(critical, report.critical_error) if critical else "none"),
         *_coexisting(both),
         ("also changes at", [_crossing(each) for each in report.crossings if each is not critical]),
         ("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
@@ -108,10 +109,18 @@ def _lock_in(found: LockIn) -> str:
     return "\n\n" + "\n\n".join((f"Along {keys}:\n" + grid(columns), changes))
 
 
-def _crossing(crossing: Crossing) -> str:
+def _bar(error: float | None) -> str:
+    """What stands behind a number that is not known to all of its digits."""
+    if error is None:
+        return ", but single windows of the waves have none near it"
+    return f" ± {error:.1g}" if error else ""
+
+
+def _crossing(crossing: Crossing, error: float | None = 0.0) -> str:
     change = "lost" if crossing.lost else "regained"
     where = f" at {crossing.frequency:.5g} Hz" if crossing.frequency else ""
-    return f"{crossing.friction:.7g}: stability {change} by {crossing.instability}{where}"
+    digits = crossing.friction if not error else round(crossing.friction, 1 - math.floor(math.log10(error)))
+    return f"{digits:.7g}{_bar(error)}: stability {change} by {crossing.instability}{where}"
 
 
 def _until(change: Change) -> str:

@@ -17,8 +17,10 @@ from brakecli.solver.records import EVALUATE, LAYER, Layer
 from brakecli.solver.roughness import turn
 from brakecli.solver.system import System
 
+WINDOWS = 4
+"""Stretches of the wheel of which each has an average of its own: by their differences the error is known."""
 PLACES = 1024
-"""Positions of the wheel that an average takes, over 50 of its longest waves."""
+"""Positions of the wheel that an average takes, in all stretches, each as long as 50 of its longest waves."""
 _LONGEST = 50.0
 TABLE = 129
 _HEIGHT, _RELATIVE = 1e-15, 1e-14  # errors of y: over the roughness, and over itself; a few units of rounding
@@ -75,7 +77,7 @@ def forces_along(heights: Floats, places: Floats, layer: Layer, forces: Floats) 
 
 def averaged_length(system: System) -> float:
     """Travel of the wheel (m) that an average is taken over."""
-    return _LONGEST / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0
+    return WINDOWS * _LONGEST / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0
 
 
 def fills_window(system: System) -> bool:
@@ -83,26 +85,38 @@ def fills_window(system: System) -> bool:
     return 0.0 < system.window_rows * averaged_length(system) < PLACES * 2.0 * system.half_length
 
 
-def mean_contact(system: System, y: float) -> tuple[float, float, float]:
-    """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over the travel of the wheel.
+def mean_contacts(system: System, y: float) -> Floats:
+    """Force (N), stiffness (N/m) and touching part at a height y (m), averaged over each of the windows, in rows.
 
-    Full contact averages to its closed form. Otherwise places over many waves are averaged under a Hann window, so
-    that waves that do not close leave a trace of 1e-6 only.
+    Full contact averages to its closed form. Otherwise places over many waves are averaged under Hann windows, so
+    that waves that do not close leave little. They lie alike on either side of the wheel's first place, so that
+    mirror images have the same averages. From window to window they are shifted by a part of their distance:
+    together they sample a wave that closes as finely as all of them would.
     """
     pad, wheel = system.pad.constants, system.wheel
     covered = coverage(y, pad)
     length = 2.0 * pad.half_length
     if covered == CLEAR:
-        return 0.0, 0.0, 0.0
+        return np.zeros((WINDOWS, 3))
     if covered == FULL:
-        return -pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0
-    places = np.zeros(1) if wheel.g.size == 0 else averaged_length(system) * (np.arange(PLACES) + 0.5) / PLACES
-    weights = np.ones(1) if wheel.g.size == 0 else 2.0 * np.sin(np.pi * (np.arange(PLACES) + 0.5) / PLACES) ** 2
-    found = np.zeros(3)
+        return np.tile([-pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0], (WINDOWS, 1))
+    found = np.zeros((WINDOWS, 3))
     layer = build_layer(system.evaluate, system.pad, moving=fills_window(system))
-    add_places(y, places, weights, layer, found)
-    force, stiffness, fraction = found / len(places)
-    return float(force), float(stiffness), float(fraction)
+    if wheel.g.size == 0:
+        add_places(y, np.zeros(1), np.ones(1), layer, found[0])
+        return np.tile(found[0], (WINDOWS, 1))
+    window, each = averaged_length(system) / WINDOWS, PLACES // WINDOWS
+    for k in range(WINDOWS):
+        parts = (np.arange(each) + (k + 0.5) / WINDOWS) / each
+        weights = 2.0 * np.sin(np.pi * parts) ** 2
+        add_places(y, window * (parts + k - WINDOWS // 2), weights / each, layer, found[k])
+    return found
+
+
+def mean_contact(system: System, y: float) -> tuple[float, float, float]:
+    """The same averaged over all windows."""
+    force, stiffness, fraction = mean_contacts(system, y).mean(axis=0).tolist()
+    return force, stiffness, fraction
 
 
 @dataclass(frozen=True)
@@ -114,23 +128,34 @@ class _Surfaces:
 
 
 @lru_cache(maxsize=4)
-def _table(surfaces: _Surfaces) -> tuple[Any, Any, Any]:
-    """Force, its slope and the touching part between full contact and none, interpolated.
+def _table(surfaces: _Surfaces) -> tuple[Floats, Floats]:
+    """Heights (m) between full contact and none, and the mean contact at each of them in each window."""
+    pad = surfaces.system.pad.constants
+    heights = np.linspace(float(pad.full_up_to), float(pad.clear_from), TABLE)
+    values = np.array([mean_contacts(surfaces.system, float(y)) for y in heights])
+    values[:, :, :2] /= surfaces.system.layer_stiffness
+    return heights, values
+
+
+@lru_cache(maxsize=4 * (1 + WINDOWS))
+def _interpolated(surfaces: _Surfaces, window: int | None) -> tuple[Any, Any, Any]:
+    """Force, its slope and the touching part between full contact and none, interpolated; `window`: by one alone.
 
     The force is a cubic through its values and slopes; its error falls with the fourth power of the spacing.
     """
     from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-    pad = surfaces.system.pad.constants
-    heights = np.linspace(float(pad.full_up_to), float(pad.clear_from), TABLE)
-    values = np.array([mean_contact(surfaces.system, float(y)) for y in heights])
-    values[:, :2] /= surfaces.system.layer_stiffness
+    heights, each = _table(surfaces)
+    values = each.mean(axis=1) if window is None else each[:, window]
     force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
     return force, force.derivative(), PchipInterpolator(heights, values[:, 2])
 
 
-def tabulated(system: System) -> Mean:
-    """The mean contact, interpolated between `TABLE` heights where the pad touches in part: for many calls."""
+def tabulated(system: System, window: int | None = None) -> Mean:
+    """The mean contact, interpolated between `TABLE` heights where the pad touches in part: for many calls.
+
+    `window`: by the average over one of the windows alone.
+    """
     mean, pad = partial(mean_contact, system), system.pad.constants
     full, top = float(pad.full_up_to), float(pad.clear_from)
     profiles = [each.tobytes() for profile in (system.shoe, system.wheel) for each in profile]
@@ -140,7 +165,7 @@ def tabulated(system: System) -> Mean:
     def interpolated(y: float) -> tuple[float, float, float]:
         if not full < y < top:
             return mean(y)
-        force, slope, fraction = _table(surfaces)
+        force, slope, fraction = _interpolated(surfaces, window)
         return k * float(force(y)), -k * float(slope(y)), float(fraction(y))
 
     return interpolated

@@ -22,7 +22,9 @@ from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, TANGENT_TYPE, Beside, Coefficients
 
 BATCHES = 8
-"""Batches of the parts of the second half of a run."""
+"""Batches of the parts of the second half of a run; of twice as many parts each, half as many."""
+ALIKE = 4
+"""Sizes of a group that may leave the line of `even` together: an eighth of a run."""
 PLACED, PLACED_LAGGING = 1 / 16, 1 / 4
 """Parts of a step by which the growth may be off at an event inside it. The first is for schemes whose velocity is
 that of the level reached, the second for those whose velocity lags. Limit cycles, whose exponent is 0, have shown
@@ -52,21 +54,27 @@ def seed(t: Any, state: Any, h: float) -> None:
 
 
 def exponents(logs: Floats, duration: float) -> list[Exponent]:
-    """The exponents in the second half of runs, with the standard error of the mean of their batches.
+    """The exponents in the second half of runs, with their standard errors.
 
-    Within a cycle a disturbance swings: its size is a mean over a batch. `logs`: ln of the growth in each part, in
-    the columns of runs. `even` is by the whole of a run but its first eighth.
+    Within a cycle a disturbance swings: its size is a mean over a batch. What wanders slowly is alike in
+    neighbouring batches, which tell too little of it: the error is the larger of those by all batches and by half
+    as many. `logs`: ln of the growth in each part, in the columns of runs. `even` is by the whole of a run but its
+    first eighth; its error is the larger of those by sizes that know nothing of each other, and that are alike in
+    groups.
     """
     sizes = np.cumsum(logs, axis=0).reshape(4 * BATCHES, -1, logs.shape[1]).mean(axis=1)
     late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
     rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
-    means, errors = rates.mean(axis=0), rates.std(axis=0, ddof=1) / math.sqrt(len(rates))
+    longer = np.diff(late.reshape(BATCHES // 2, 2, -1).mean(axis=1), axis=0) * (BATCHES / duration)
+    errors = np.maximum(*(each.std(axis=0, ddof=1) / math.sqrt(len(each)) for each in (rates, longer)))
     lined = sizes[len(sizes) // 8 :]
     places = (np.arange(len(lined)) - 0.5 * (len(lined) - 1)) * (duration / len(sizes))
     slopes = places @ lined / (places @ places)
     rest = lined - lined.mean(axis=0) - np.outer(places, slopes)
-    off = np.sqrt((rest**2).sum(axis=0) / (len(lined) - 2) / (places @ places))
-    return [Exponent(*each) for each in np.stack([means, errors, slopes, off], axis=1).tolist()]
+    apart = (rest**2).sum(axis=0) * (places @ places) / (len(lined) - 2)
+    alike = ((places[:, None] * rest).reshape(-1, ALIKE, rest.shape[1]).sum(axis=1) ** 2).sum(axis=0)
+    off = np.sqrt(np.maximum(apart, alike)) / (places @ places)
+    return [Exponent(*each) for each in np.stack([rates.mean(axis=0), errors, slopes, off], axis=1).tolist()]
 
 
 def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:

@@ -87,7 +87,9 @@ def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Expon
         one, other = (_growth(part) / (len(part) * span) for part in (maps[:half], maps[half:]))
         return Exponent(0.5 * (one + other), 0.5 * abs(one - other))
     means = np.reshape(logs[TRANSIENT : TRANSIENT + batches * BATCH], (batches, BATCH)).mean(axis=1) / span
-    return Exponent(float(means.mean()), CERTAIN * float(means.std(ddof=1)) / math.sqrt(batches))
+    longer = means[batches % 2 :].reshape(-1, 2).mean(axis=1)  # what wanders slowly is alike in neighbours
+    off = max(float(each.std(ddof=1)) / math.sqrt(len(each)) for each in (means, longer))
+    return Exponent(float(means.mean()), CERTAIN * off)
 
 
 def _growth(maps: list[Floats]) -> float:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.bursts import bursts
+from brakecli.analysis.regime.cleaning import cleaned
 from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.of_signal import Measurand, Signal, look
 from tests.campaign import campaign
@@ -61,3 +62,44 @@ def test_an_acceleration_gives_the_amplitude_of_the_displacement() -> None:
     assert found.frequency == pytest.approx(200.0, rel=1e-3)
     sound = look(Signal(values, 1.0 / RATE), quantity=Measurand.PRESSURE).verdict
     assert sound.amplitude is None  # a pressure has no metres
+
+
+def in_bursts(frequency: float, count: int, noise: float, seed: int = 4) -> np.ndarray:
+    """As many bursts as would fill 0.4 s, with noise."""
+    starts, long = (np.arange(count) + 0.3) / count, 0.4 / count
+    values = sum((tone(frequency, start, start + long, 1.0) for start in starts), np.zeros(len(TIME)))
+    return values + noise * np.random.default_rng(seed).normal(size=len(TIME))
+
+
+@pytest.mark.parametrize("count", [1, 4])
+@pytest.mark.parametrize("noise", [1e-4, 0.01, 0.1])
+@pytest.mark.parametrize("frequency", [200.0, 1900.0, 5000.0, 7000.0])
+def test_no_sample_of_a_burst_is_a_spike(frequency: float, noise: float, count: int) -> None:
+    for order in (0, 1):
+        assert cleaned(in_bursts(frequency, count, noise), order)[1] == []
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_spikes_are_found_in_bursts_and_beside_them_and_nothing_else(count: int) -> None:
+    clean = in_bursts(1900.0, count, 1e-4)
+    rng = np.random.default_rng(5)
+    places = np.sort(rng.choice(len(TIME) // 40, 40, replace=False) * 40 + 20)
+    values = clean.copy()
+    values[places] += rng.choice([-5.0, 5.0], len(places))
+    velocity, notes = cleaned(values, 1)
+    assert notes == ["spikes removed: 40"]
+    changed = np.flatnonzero(np.abs(velocity.values + velocity.mean - values) > 1e-9)
+    assert changed.tolist() == places.tolist()
+
+
+def test_a_record_with_several_bursts_says_so_first() -> None:
+    for noise in (1e-4, 0.1):
+        found = look(Signal(in_bursts(1900.0, 4, noise), 1.0 / RATE), quantity=Measurand.PRESSURE).verdict
+        assert found.regime == Regime.QUASI_HARMONIC
+        assert found.reasons[0].startswith("in 4 bursts, the strongest from ")
+        assert found.frequency == pytest.approx(1900.0, rel=1e-3)
+        assert len(found.bursts) == 4
+    coarse = look(Signal(in_bursts(5000.0, 4, 1e-4), 1.0 / RATE), quantity=Measurand.PRESSURE).verdict
+    assert coarse.regime == Regime.UNDECIDED
+    assert coarse.reasons[0].startswith("in 4 bursts, the strongest from ")
+    assert "samples a cycle" in coarse.reasons[0]

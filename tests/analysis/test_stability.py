@@ -9,10 +9,14 @@ import pytest
 from brakecli.analysis.stability.modes import crossings, eigensystem, growth, modes
 from brakecli.analysis.stability.report import is_stable, stability, step_limit, undamped_critical
 from brakecli.case.system import system_of
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.links import coefficients, natural_frequencies
 from brakecli.solver.records import Coefficients
+from brakecli.solver.steady_sliding import PLACES, add_places, averaged_length
 from brakecli.solver.system import System
-from tests.campaign import counts
+from tests.analysis.mirrored import mirrored, rough_shoe
+from tests.analysis.shoes import Tables
+from tests.campaign import campaign, counts
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 
@@ -304,6 +308,65 @@ def test_mean_stiffness_is_the_slope_of_the_mean_force() -> None:
         assert table(y)[1] == pytest.approx(mean(y)[1], rel=1e-2)
         tried += 1
     assert tried == 4
+
+
+OPEN: Tables = {
+    "shoe": {"mass": 35.25815973711631},
+    "wheel": {"radius": 0.2179679467091094, "angular_speed": 0.21091880159314244},
+    "link1": {"stiffness": 1111487.9202426341, "damping": 608.2941501587975, "angle_deg": 2.14025474837392},
+    "link2": {"stiffness": 1339039.0343930663, "damping": 39.22264594308555, "angle_deg": 32.0400016612693},
+    "load": {"force": 283.1354567453749},
+    "friction": {"coefficient": 3.5872188293373206},
+    "contact": {"half_length": 0.0016370101036845138, "stiffness": 76393525.53122489},
+    "roughness": {
+        "wheel": {
+            "amplitudes": [0.0001455176122683059, 5.785464000741007e-05, 5.15976287351854e-05],
+            "wavelengths": [0.0034418222240715788, 0.00048446013498474667, 0.006081502824930711],
+            "phases_deg": [211.7407489958079, 209.70739685782038, 63.68051681891786],
+        }
+    },
+    "solver": {"duration": 1.0, "step": 1e-4},
+}
+"""Waves without a short common period, over which a mean depends on where it is taken."""
+
+
+def test_mirror_images_of_an_open_pad_have_the_same_critical_friction() -> None:
+    one, other = (stability(system_of(make(tables))) for tables in (OPEN, mirrored(OPEN)))
+    assert one.critical is not None
+    assert other.critical is not None
+    assert one.critical.friction == pytest.approx(other.critical.friction, rel=1e-9)
+    assert one.critical_error == pytest.approx(other.critical_error, rel=1e-6)
+
+
+def test_a_mean_over_waves_has_a_bar_that_holds_a_finer_one() -> None:
+    """Of 16 times as many places over 16 times as many waves."""
+    system = system_of(make(OPEN))
+    report = stability(system)
+    assert report.equilibrium is not None
+    assert report.critical_error is not None
+    assert 1e-4 < report.critical_error < 1e-2
+    y, layer = report.equilibrium.y, build_layer(system.evaluate, system.pad)
+    parts, sums = (np.arange(16 * PLACES) + 0.5) / (16 * PLACES), np.zeros(3)
+    add_places(y, 16.0 * averaged_length(system) * parts, 2.0 * np.sin(np.pi * parts) ** 2, layer, sums)
+    finer = float(sums[1]) / len(parts)
+    assert abs(report.contact_stiffness - finer) < report.contact_stiffness_error < 2e-3 * finer
+    full = stability(system_of(make({**OPEN, "load": {"force": 1e5}})))
+    assert (full.critical_error, full.contact_stiffness_error) == (0.0, 0.0)
+
+
+@campaign
+def test_mirror_images_of_open_pads_agree_within_their_bars() -> None:
+    tried = 0
+    for seed in range(200):
+        tables = rough_shoe(seed)
+        one, other = (stability(system_of(make(each))) for each in (tables, mirrored(tables)))
+        if one.critical is None or one.critical_error == 0.0:
+            continue
+        assert other.critical is not None
+        off = 1e-9 + (one.critical_error or 1.0) + (other.critical_error or 1.0)
+        assert abs(one.critical.friction - other.critical.friction) <= off, seed
+        tried += 1
+    assert tried >= 60
 
 
 def test_modes_of_a_decoupled_shoe_have_the_ratios_of_single_oscillators() -> None:

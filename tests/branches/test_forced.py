@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brakecli.analysis.stability.linear import linear_theory
 from brakecli.branches.follow import both_ways, follow
 from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
@@ -335,3 +336,37 @@ def test_a_rough_wheel_has_no_cycles_of_its_own() -> None:
     _, line = line_of(9000)
     with pytest.raises(CaseError, match="the wheel is rough"):
         RoughCycles(line)
+
+
+SMALL: Tables = {
+    "shoe": {"mass": 46.129521795716045},
+    "wheel": {"radius": 0.7410608363731757, "angular_speed": 0.0017932722653984268},
+    "link1": {"stiffness": 22405785.378138486, "damping": 118.65562481872233, "angle_deg": -10.344508228088703},
+    "link2": {"stiffness": 156125774.89717624, "damping": 1590.8735919957098, "angle_deg": 32.924093907981344},
+    "load": {"force": 79.95868511312914},
+    "friction": {"coefficient": 0.3678336553553474},
+    "contact": {"half_length": 1.2109011771019828e-05, "stiffness": 9857782109640.273},
+    "roughness": {
+        "wheel": {
+            "amplitudes": [1.67178158691992e-09],
+            "wavelengths": [1.118702378400082e-05],
+            "phases_deg": [7.834480612458514],
+        }
+    },
+    "solver": {"duration": 1.0, "step": 1e-5},
+}
+"""What the wave forces is a three thousandth of the depth that the load presses the shoe in by."""
+
+
+def test_the_amplitude_of_a_small_forced_motion_is_that_of_the_linear_one() -> None:
+    """Of one wave in full contact: |x| of (S + iωB - ω²m) z = f, by another program's formula."""
+    line = Line(make(SMALL), [FRICTION], 0.05 * 0.3678, 0.7 * 0.3678)
+    problem = Forced.along(line)
+    first = problem.begun(0.0)
+    assert first is not None
+    branch = follow(problem, first, 1.0)
+    assert len(branch.points) > 5
+    for point in branch.points:
+        theory = linear_theory(line.system(point.p), line.system(point.p).belt_speed)
+        assert theory is not None
+        assert point.facts.amplitude == pytest.approx(abs(theory.waves[0, 0]), rel=2e-4)

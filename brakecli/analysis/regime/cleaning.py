@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
@@ -21,6 +22,8 @@ _QUIET = 0.02  # and where all else is looked at
 _DRIFT_CYCLES = 8.0  # over which drift is averaged
 _COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
 _SHORTEST = 8  # samples in which noise can be told
+_SIDE = 24  # samples before and behind, the louder of which a spike has to leave; a choice
+_OUTER_DEVIATIONS = 1.645  # standard deviations that a tenth of normal numbers leave their middle by
 _BESIDE = 3.0  # times what its neighbours leave the median by, beyond which a sample is alone
 _FEWEST_PULSES, _ONE_WAY = 5, 0.6  # spikes, and their mean sign, from which on they may be pulses of slip
 _SHORT_GAP = 0.25  # of a cycle: a straight line over it changes no turning point by much
@@ -183,14 +186,27 @@ def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple
     return values[begin:end], int(begin)
 
 
+def _far(values: Array, away: Array) -> Any:
+    """By what a spike leaves the median of its neighbours, which others leave by `away`; along the last axis."""
+    low, high = np.quantile(values, [_OUTER, 1.0 - _OUTER], axis=-1)
+    deviation = DEVIATION * np.median(np.abs(away), axis=-1)
+    return np.maximum(_SPIKE_DEVIATIONS * deviation, _SPIKE_RANGE * (high - low))
+
+
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:
-    """Replace single samples far from both sides. A velocity's pulses of slip are not spikes."""
+    """Replace single samples far from both sides. A velocity's pulses of slip are not spikes.
+
+    They leave the record's level, and that of the samples beside them: a loud part is not far from itself.
+    """
     away = values - median_filter(values, 5, mode="nearest")
-    low, high = np.quantile(values, [_OUTER, 1.0 - _OUTER])
-    deviation = DEVIATION * float(np.median(np.abs(away)))
-    spikes = np.abs(away) > max(_SPIKE_DEVIATIONS * deviation, _SPIKE_RANGE * float(high - low))
+    spikes = np.abs(away) > _far(values, away)
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
     spikes &= np.abs(away) > _BESIDE * beside
+    places = np.flatnonzero(spikes)
+    for side in (np.arange(-_SIDE, 0), np.arange(1, _SIDE + 1)):
+        there = np.clip(places[:, None] + side, 0, len(values) - 1)
+        beyond = _SPIKE_DEVIATIONS * np.quantile(np.abs(away[there]), 1.0 - _OUTER, axis=-1) / _OUTER_DEVIATIONS
+        spikes[places] &= np.abs(away[places]) > np.maximum(_far(values[there], away[there]), beyond)
     count = int(np.sum(spikes))
     if count == 0:
         return values

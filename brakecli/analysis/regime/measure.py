@@ -6,8 +6,10 @@ from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from brakecli.analysis.regime.answers import Answers, Fate
+from brakecli.analysis.regime.conditions import steady
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
@@ -124,11 +126,20 @@ class Shown:
         least = max([amplitude, *(swing for _, swing in self.context.waves)])
         return tuple([f for f, swing in self.context.waves if swing >= self.limits.settled_within * least])
 
-    def changes(self) -> float:
-        """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
+    @cached_property
+    def _before(self) -> NDArray[np.float64]:
+        """Level of vx and amplitude of x in the third quarter, over those in the last one."""
         before = Part(self.history, self.half, 3 * self.samples // 4)
         sizes = np.array([before.deviation("vx"), before.amplitude("x")])
-        return float(np.abs(sizes / np.maximum([self.seen.level, self.seen.amplitude], 1e-300) - 1.0).max())
+        return sizes / np.maximum([self.seen.level, self.seen.amplitude], 1e-300)
+
+    def changes(self) -> float:
+        """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
+        return float(np.abs(self._before - 1.0).max())
+
+    def drift(self) -> float:
+        """Rate (1/s) at which vx or x, whichever does more so, changes from the third quarter to the last."""
+        return float(np.abs(np.log(np.maximum(self._before, 1e-300))).max()) / (0.25 * self.duration)
 
     def powers(self) -> dict[str, float]:
         """Powers (W) that friction and the roughness give, with their errors, by the loop's account.
@@ -180,7 +191,7 @@ def answers(shown: Shown) -> Answers:
         "carried": shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
     }
     if exponent is not None:
-        found |= dict(zip(("exponent", "exponent_error", "even", "even_error"), exponent, strict=True))
+        found |= {"exponent": exponent.rate, "even": exponent.even, "even_error": exponent.even_error}
     if shown.brief:
         return Answers(**found)
     found |= {
@@ -193,6 +204,10 @@ def answers(shown: Shown) -> Answers:
         "settled": seen.settled_from > 0,
         "seconds": (shown.samples - shown.judged_from) * shown.interval,
     }
+    if exponent is not None:
+        drift = 0.0 if found["settled"] else shown.drift()
+        passing = 0.0 if _lasts(shown, Answers(**found)) else max(exponent.rate, 0.0)  # what grows on the way only
+        found["exponent_error"] = math.hypot(exponent.error, drift, passing)
     if (theory := shown.linear) is not None:
         found |= {"linear": True, "ringing": theory.mode.frequency}
         if math.isfinite(theory.known_to):  # otherwise only neighbours tell
@@ -202,6 +217,16 @@ def answers(shown: Shown) -> Answers:
     else:
         found |= _of_more(shown, waves)
     return Answers(**found)
+
+
+def _lasts(shown: Shown, found: Answers) -> bool:
+    """Whether disturbances will grow as they do: they fade from a linear motion, or the level does not change.
+
+    Over windows it may change with the waves that pass in them, and not over quarters.
+    """
+    theory, limits = shown.linear, shown.limits
+    fades = theory is not None and theory.direction < 0
+    return fades or steady(found, limits) or shown.changes() <= limits.settled_within
 
 
 def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:

@@ -15,8 +15,9 @@ from brakecli.analysis.regime.signal_table import SignalThresholds, decide
 from brakecli.analysis.regime.stick import Slips, seek
 from brakecli.analysis.spectrum import Array
 
-_MOST_OF_IT = 0.9  # of the record: a burst that fills as much is the record
-_MOST_ENERGY = 0.5  # of all bursts in one that speaks for the record
+_MOST_OF_IT = 0.9  # of the record: bursts that fill as much are the record
+_MOST_ENERGY = 0.5  # of all bursts in those that speak for the record
+_ALIKE = 0.06  # of its frequency, by which a burst's may differ from that of the strongest one; a choice
 _INSIDE = 0.05  # of a burst, left out at either end
 _LEVEL = 0.3  # change of its logarithm in a burst; a ring-down that is cut at half has 0.7
 _DEFAULT = SignalThresholds()
@@ -69,6 +70,9 @@ class SignalVerdict:
     contact_loss_fraction: None = None  # nor whether contact was lost
 
 
+_Known = tuple[Measurand, float | None, float | None, SignalThresholds]  # what is known of a signal besides it
+
+
 @dataclass(frozen=True)
 class SignalLook:
     """A verdict with what it was found from, for pictures."""
@@ -88,7 +92,7 @@ def look(
     stiffness: float | None = None,
     thresholds: SignalThresholds = _DEFAULT,
 ) -> SignalLook:
-    """The verdict with the velocity that it rests on; that of the strongest burst where all else is silence.
+    """The verdict with the velocity that it rests on; that of the strongest burst where tones come and go.
 
     `belt_speed` in m/s, `stiffness` in N/m (of a force) where known.
     """
@@ -96,20 +100,33 @@ def look(
     found = _judge(signal, *known)
     tones = tuple(bursts(bridged(signal.values), step))
     verdict = replace(found.verdict, bursts=tones)
-    short = [tone for tone in tones if tone.end - tone.start < _MOST_OF_IT * len(signal.values) * step]
-    burst = max(short, key=lambda tone: tone.energy, default=None)
-    rare = burst and burst.energy >= _MOST_ENERGY * sum(tone.energy for tone in tones)
-    if burst and rare and verdict.regime not in _SUSTAINED:
+    filled = sum(tone.end - tone.start for tone in tones)
+    if tones and filled < _MOST_OF_IT * len(signal.values) * step and verdict.regime is not Regime.RELAXATION:
+        verdict = _of_bursts(signal, known, verdict)
+    return replace(found, verdict=verdict)
+
+
+def _of_bursts(signal: Signal, known: _Known, whole: SignalVerdict) -> SignalVerdict:
+    """The verdict where tones come and go: that of the strongest burst, if those like it have most energy."""
+    tones, step = whole.bursts, signal.interval
+    burst = max(tones, key=lambda tone: tone.energy)
+    like = [tone for tone in tones if abs(tone.frequency - burst.frequency) <= _ALIKE * burst.frequency]
+    when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s"
+    if len(like) > 1:
+        when = f"in {len(like)} bursts, the strongest from {burst.start:.4g} to {burst.end:.4g} s"
+    if sum(tone.energy for tone in like) >= _MOST_ENERGY * sum(tone.energy for tone in tones):
         begin, end = (int(time / step) for time in (burst.start, burst.end))
         margin = int(_INSIDE * (end - begin))
         part = replace(signal, values=signal.values[begin + margin : end - margin])
-        inside = _judge(part, *known).verdict if np.isfinite(part.values).any() else verdict
+        inside = _judge(part, *known).verdict if np.isfinite(part.values).any() else whole
         sustained = inside.regime in _SUSTAINED and inside.evidence["steady_from"] == 0.0
         if sustained and abs(inside.evidence["change"]) < _LEVEL:
-            when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s: {inside.reasons[0]}"
             line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
-            verdict = replace(inside, reasons=(when,), frequency=line, bursts=tones, warnings=verdict.warnings)
-    return replace(found, verdict=verdict)
+            said = (f"{when}: {inside.reasons[0]}",)
+            return replace(inside, reasons=said, frequency=line, bursts=tones, warnings=whole.warnings)
+    if whole.regime is Regime.DAMPED:
+        return whole
+    return replace(whole, reasons=(f"{when}: {whole.reasons[0]}",))
 
 
 def _judge(

@@ -34,6 +34,8 @@ class Verdict:
     ringing_frequency: float | None = None  # Hz, of that mode
     frequency_resolution: float | None = None  # Hz, to which a line of the spectrum is known
     torque_variation: float | None = None  # N m, peak to peak
+    lyapunov_exponent: float | None = None  # 1/s, at which disturbances of a motion that lasts grow
+    lyapunov_error: float | None = None  # 1/s
     notes: dict[str, str] = field(default_factory=dict)  # on single numbers, by their names
     thresholds: Thresholds = field(default_factory=Thresholds)
 

@@ -23,12 +23,22 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
-from brakecli.solver.steady_sliding import UNPRESSED, SteadySliding, sliding, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import (
+    UNPRESSED,
+    WINDOWS,
+    Mean,
+    SteadySliding,
+    sliding,
+    steady_sliding,
+    tabulated,
+)
 from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
 FRICTION_STEP = 0.025
 FRICTIONS = 41  # values among which a scheme is asked where it loses stability, by 0.25 where nothing is known
+SURE = 3.0  # standard errors of the mean of the windows that a bar holds; a choice
+NEAREST, WIDER = 1e-9, 4.0  # half a bracket of friction in which a window is asked first, and by which it grows
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
 _GROWS = 1e-9  # growth (1/s) over the highest natural frequency (Hz), below which it is rounding
@@ -65,6 +75,8 @@ class StabilityReport:
     modes: tuple[Mode, ...]
     crossings: tuple[Crossing, ...]
     critical: Crossing | None  # the smallest friction coefficient at which stability is lost
+    critical_error: float | None  # by which the mean over the waves leaves it open; None where that is not known
+    contact_stiffness_error: float  # N/m, the same of the contact stiffness
     undamped_flutter: float | None  # φ, closed forms for the contact stiffness above
     undamped_divergence: float | None
     discrete: Discrete | None
@@ -85,6 +97,8 @@ def stability(system: System) -> StabilityReport:
     stiffness_at = mean_stiffness(system, k)
     found = changes(system, stiffness_at)
     critical = next((crossing for crossing in found if crossing.lost), None)
+    means = [] if system.smooth else [tabulated(system, window) for window in range(WINDOWS)]
+    opens = means if rest and rest.contact_fraction < 1.0 else []
     flutter, divergence = undamped_critical(c, k, belt)
     grip = c.grip(belt)
     values, _ = eigensystem(c, k, grip)
@@ -100,6 +114,8 @@ def stability(system: System) -> StabilityReport:
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
         critical=critical,
+        critical_error=_critical_error(system, critical, means) if critical else None,
+        contact_stiffness_error=_spread([at.stiffness for mean in opens if (at := sliding(system, mean))]),
         undamped_flutter=flutter,
         undamped_divergence=divergence,
         discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
@@ -171,6 +187,36 @@ def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
         return rest.stiffness if rest and rest.is_pressed(system.load_at_start) else math.nan
 
     return at
+
+
+def _spread(values: list[float]) -> float:
+    """By how much the mean of what the windows say is surely not off; 0 where there are none."""
+    return SURE * float(np.std(values, ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
+
+
+def _critical_error(system: System, critical: Crossing, means: list[Mean]) -> float | None:
+    """By which the mean over the waves leaves a critical friction open: where single windows would have it."""
+    c, belt, friction = system.coefficients, system.belt_speed, critical.friction
+    rests = [sliding(system, mean, friction) for mean in means]
+    if belt == 0.0 or c.c_xx == 0.0 or all(rest is not None and rest.contact_fraction == 1.0 for rest in rests):
+        return 0.0
+    found = list[float]()
+    for mean in means:
+
+        def stable(phi: float, mean: Mean = mean) -> bool:
+            rest = sliding(system, mean, phi)
+            if rest is None or not rest.is_pressed(system.load_at_start):
+                return False
+            return not modes(c._replace(phi=phi), rest.stiffness, math.copysign(phi, belt))[0].growth > 0.0
+
+        away = NEAREST
+        while stable(friction + away) or not stable(max(friction - away, 0.0)):
+            away *= WIDER
+            if away > FRICTION_STEP:
+                return None
+        low, high = bisect(stable, max(friction - away, 0.0), friction + away, width=NEAREST * away)
+        found.append(0.5 * (low + high))
+    return _spread(found)
 
 
 def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up_to: float) -> list[Crossing]:
