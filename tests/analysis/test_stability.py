@@ -366,7 +366,9 @@ def test_mirror_images_of_open_pads_agree_within_their_bars() -> None:
         off = 1e-9 + (one.critical_error or 1.0) + (other.critical_error or 1.0)
         assert abs(one.critical.friction - other.critical.friction) <= off, seed
         tried += 1
-    assert tried >= 60
+        if tried == 60:
+            return
+    raise AssertionError(tried)
 
 
 def test_modes_of_a_decoupled_shoe_have_the_ratios_of_single_oscillators() -> None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.answers import Answers, Fate
-from brakecli.analysis.regime.conditions import steady
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
@@ -220,13 +219,10 @@ def answers(shown: Shown) -> Answers:
 
 
 def _lasts(shown: Shown, found: Answers) -> bool:
-    """Whether disturbances will grow as they do: they fade from a linear motion, or the level does not change.
-
-    Over windows it may change with the waves that pass in them, and not over quarters.
-    """
-    theory, limits = shown.linear, shown.limits
+    """Whether disturbances will grow as they do: they fade from a linear motion, or the level surely stays."""
+    theory = shown.linear
     fades = theory is not None and theory.direction < 0
-    return fades or steady(found, limits) or shown.changes() <= limits.settled_within
+    return fades or abs(found.change) <= shown.limits.sure_errors * found.change_error
 
 
 def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
