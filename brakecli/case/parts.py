@@ -164,8 +164,8 @@ class Solver(Table):
         "1", "largest relative error of the histories, 0.001 if there is no step either", None
     )
     duration: Duration = quantity("s", 'time to simulate, or "settled": until the verdict is decided')
-    budget: Annotated[int, Field(ge=1, le=MOST_BUDGET)] | None = quantity(
-        "1", f'steps that duration = "settled" may take in all, {BUDGET} if left out', None
+    budget: Annotated[int, Field(ge=1, le=MOST_BUDGET)] | None = described(
+        f'steps that duration = "settled" may take in all, {BUDGET} if left out', None
     )
     allow_unconverged: bool = described("whether a run goes on after a step that did not converge", False)
 
