@@ -31,8 +31,8 @@ BUSY = 20.0
 def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is_refused_if_they_take_days(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    def waved(count: int, size: float, longest: float = 0.01) -> System:
-        lengths = [longest] + [0.01] * (count - 1)
+    def waved(count: int, size: float, longest: float = 0.0025) -> System:
+        lengths = [longest] + [0.0025] * (count - 1)
         waves: dict[str, Any] = {"amplitudes": [size / count] * count, "wavelengths": lengths}
         return system_of(make(SQUEAL | {"roughness": {"wheel": waves}}))
 

@@ -33,7 +33,7 @@ Counts = Counter[tuple[str, int, float | None]]
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> Counts:
-    """Calls of each function for each system and friction, or number of nodes (none: no tables)."""
+    """Calls of each function for each system, friction and mean contact, or number of nodes (none: no tables)."""
     counts, kept = Counts(), list[Any]()
 
     def counting(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -41,7 +41,9 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Counts:
         def counted(*given: Any, **options: Any) -> Any:
             kept.append(given)  # so that no other object gets this place in memory
             of = id(given[0]) if function.__name__ != "build_pad" else given[4]
-            counts[name, of, options.get("phi")] += of > 0
+            mean = options.get("mean")
+            kept.append(mean)
+            counts[name, of, options.get("phi"), mean and id(mean)] += of > 0
             return function(*given, **options)
 
         return counted

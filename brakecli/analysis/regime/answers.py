@@ -11,7 +11,8 @@ _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 FADED = 3.0  # powers of e after which a change has ended: 5 % of it are left
 _TOLD = 3.0  # errors of an exponent beyond which it is told from 0
-_TWICE, _MOST_TIMES = 2.0, 16.0  # times as long: the least and the most that is asked for; choices
+_TWICE = 2.0  # times as long, at least, that a run is asked to be; a choice
+_MOST_TIMES = 16.0  # and at most; a choice
 _SETTLED = 1.4  # a run over its settled part, where it is told how long it has to be; a choice
 
 
@@ -138,8 +139,9 @@ class Answers(NamedTuple):
     @property
     def told_apart(self) -> float:
         """Duration after which an exponent is told from 0, as its error falls with the square root of the time."""
-        times = (_TOLD * self.exponent_error / max(abs(self.exponent), 1e-300)) ** 2
-        return QUARTER * self.duration * min(max(times, _TWICE), _MOST_TIMES)
+        errors = _TOLD * self.exponent_error / max(abs(self.exponent), 1e-300)
+        times = min(errors, math.sqrt(_MOST_TIMES)) ** 2
+        return QUARTER * self.duration * max(times, _TWICE)
 
     @property
     def becomes(self) -> str:

@@ -54,40 +54,49 @@ def comes_to_it(a: Answers, t: Thresholds) -> bool:
 
 
 def gives(a: Answers, t: Thresholds) -> bool:
-    """Friction surely gives energy, though what the account leaves open were its own.
+    """Friction surely gives energy: more than the account leaves open.
 
     A level that grows stores energy, which leaves nothing open.
     """
-    left = max(a.power_left, 0.0) if steady(a, t) else 0.0
+    left = abs(a.power_left) if steady(a, t) else 0.0
     return a.power_of_friction - left > t.sure_errors * a.friction_error
 
 
 def takes(a: Answers, t: Thresholds) -> bool:
-    """Friction surely takes energy, though what the account leaves open were its own."""
-    return a.power_of_friction - min(a.power_left, 0.0) < -t.sure_errors * a.friction_error
+    """Friction surely takes energy: more than the account leaves open."""
+    return a.power_of_friction + abs(a.power_left) < -t.sure_errors * a.friction_error
 
 
 def friction_gives_most(a: Answers, t: Thresholds) -> bool:
     """Friction gives most of the energy, whoever gives what the account leaves open."""
-    error = t.sure_errors * math.hypot(a.friction_error, t.most * a.roughness_error) + _unbalanced(a, t)
-    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) > error
+    return _excess_of_friction(a, t) > _error_of_friction(a, t) + t.most * abs(a.power_left)
 
 
 def friction_gives_less(a: Answers, t: Thresholds) -> bool:
     """Nothing shows that friction gives most of the energy, by an account that balances."""
-    error = t.sure_errors * math.hypot(a.friction_error, t.most * a.roughness_error)
-    return balances(a, t) and a.power_of_friction - t.most * max(a.power_of_roughness, 0.0) <= error
+    return balances(a, t) and _excess_of_friction(a, t) <= _error_of_friction(a, t)
+
+
+def roughness_is_idle(a: Answers, t: Thresholds) -> bool:
+    """The waves neither give energy nor take it, but for a part that is lost in a settled level."""
+    error = t.sure_errors * math.hypot(a.roughness_error, t.settled_within * a.friction_error) + abs(a.power_left)
+    return abs(a.power_of_roughness) + error < t.settled_within * a.power_of_friction
 
 
 def roughness_gives_most(a: Answers, t: Thresholds) -> bool:
     """The waves give most of the energy, whoever gives what the account leaves open."""
-    error = t.sure_errors * math.hypot(a.roughness_error, t.most * a.friction_error) + _unbalanced(a, t)
+    error = t.sure_errors * math.hypot(a.roughness_error, t.most * a.friction_error) + t.most * abs(a.power_left)
     return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > error
 
 
-def _unbalanced(a: Answers, t: Thresholds) -> float:
-    """Power (W) by which what is left open may change what the larger power has before `most` times the other."""
-    return max(a.power_left, -t.most * a.power_left)
+def _excess_of_friction(a: Answers, t: Thresholds) -> float:
+    """Power (W) that friction gives beyond `most` times that of the roughness."""
+    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0)
+
+
+def _error_of_friction(a: Answers, t: Thresholds) -> float:
+    """How far that may be off."""
+    return t.sure_errors * math.hypot(a.friction_error, t.most * a.roughness_error)
 
 
 def balances(a: Answers, t: Thresholds) -> bool:

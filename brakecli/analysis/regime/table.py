@@ -17,6 +17,7 @@ from brakecli.analysis.regime.conditions import (
     gives,
     grows,
     roughness_gives_most,
+    roughness_is_idle,
     same,
     steady,
     takes,
@@ -331,11 +332,11 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         lambda a, t: (
             a.without_waves == Fate.LASTS
             and steady(a, t)
-            and same(a, t)
+            and (same(a, t) or (roughness_is_idle(a, t) and not another(a, t)))
             and friction_gives_most(a, t)
             and not a.undamped
         ),
-        "the vibration lasts without the roughness at the same level, and of its power friction gives "
+        "the vibration lasts without the roughness, and of its power friction gives "
         "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W",
         "",
         *_OWN,
