@@ -2,8 +2,8 @@
 
 import os
 
-__version__ = "0.7.0"
-__released__ = "2026-11-24"
+__version__ = "0.8.0"
+__released__ = "2026-11-28"
 ONE_THREAD = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 """Small matrices: threads for linear algebra would spin on the cores of workers, and take 80 MB each."""
 _LIBRARIES = ("HDF5_", "MATPLOTLIB", "MPLBACKEND", "NPY_", "NUMBA_", "SCIPY_")

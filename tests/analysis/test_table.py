@@ -78,7 +78,7 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "comes and goes": {"change": math.nan, "change_error": math.nan},
     "kept up by friction: quasi-harmonic": {**LASTS, "exponent": -0.1},
     "still changes": {"change": 0.5},
-    "open account": {"power_left": 1.0},
+    "energy still changes": {"power_left": 1.0},
     "phase not known": {"exponent": -0.1},
     "either": {},
 }
@@ -98,7 +98,6 @@ POWERS = (
     "forced, level",
     "forced, friction takes",
     "forced, roughness gives",
-    "self-excited: quasi-harmonic",
     "locked to the waves: quasi-harmonic",
     "kept up by friction: quasi-harmonic",
 )

@@ -170,6 +170,12 @@ def bridged(values: Array) -> Array:
     return values if good.all() else np.interp(places, places[good], values[good])
 
 
+def without_spikes(values: Array, order: int) -> Array:
+    """A signal without its gaps and spikes, as long as it was; `order` as of `cleaned`."""
+    values = bridged(values)
+    return _without_spikes(values, order > 0, []) if len(values) >= _SHORTEST else values
+
+
 def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple[Array, int]:
     """The longest part without a gap of more samples than `longest_gap`, and its first sample."""
     bad = np.concatenate([[False], ~np.isfinite(values), [False]])

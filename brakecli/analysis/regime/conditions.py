@@ -54,21 +54,17 @@ def comes_to_it(a: Answers, t: Thresholds) -> bool:
 
 
 def gives(a: Answers, t: Thresholds) -> bool:
-    """Friction surely gives energy: more than the account leaves open.
-
-    A level that grows stores energy, which leaves nothing open.
-    """
-    left = abs(a.power_left) if steady(a, t) else 0.0
-    return a.power_of_friction - left > t.sure_errors * a.friction_error
+    """Friction surely gives energy, whether dashpots take it or it is stored as the motion grows."""
+    return a.power_of_friction > t.sure_errors * a.friction_error
 
 
 def takes(a: Answers, t: Thresholds) -> bool:
-    """Friction surely takes energy: more than the account leaves open."""
+    """Friction surely takes energy: more than is set free as the motion falls."""
     return a.power_of_friction + abs(a.power_left) < -t.sure_errors * a.friction_error
 
 
 def friction_gives_most(a: Answers, t: Thresholds) -> bool:
-    """Friction gives most of the energy, whoever gives what the account leaves open."""
+    """Friction gives most of the energy, also of what is stored or set free."""
     return _excess_of_friction(a, t) > _error_of_friction(a, t) + t.most * abs(a.power_left)
 
 
@@ -84,7 +80,7 @@ def roughness_is_idle(a: Answers, t: Thresholds) -> bool:
 
 
 def roughness_gives_most(a: Answers, t: Thresholds) -> bool:
-    """The waves give most of the energy, whoever gives what the account leaves open."""
+    """The waves give most of the energy, also of what is stored or set free."""
     error = t.sure_errors * math.hypot(a.roughness_error, t.most * a.friction_error) + t.most * abs(a.power_left)
     return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > error
 

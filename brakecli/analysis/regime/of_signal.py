@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.bursts import Burst, bursts
-from brakecli.analysis.regime.cleaning import Velocity, bridged, cleaned, without_drift
+from brakecli.analysis.regime.cleaning import Velocity, cleaned, without_drift, without_spikes
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.signal_measure import Heard, answers
 from brakecli.analysis.regime.signal_table import SignalThresholds, decide
@@ -98,7 +98,7 @@ def look(
     """
     step, known = signal.interval, (quantity, belt_speed, stiffness, thresholds)
     found = _judge(signal, *known)
-    tones = tuple(bursts(bridged(signal.values), step))
+    tones = tuple(bursts(without_spikes(signal.values, quantity.order), step))
     verdict = replace(found.verdict, bursts=tones)
     filled = sum(tone.end - tone.start for tone in tones)
     if tones and filled < _MOST_OF_IT * len(signal.values) * step and verdict.regime is not Regime.RELAXATION:

@@ -350,11 +350,11 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         longer=True,
     ),
     Row(
-        "open account",
+        "energy still changes",
         lambda a, t: math.isfinite(a.power_left) and not balances(a, t),
-        "friction gives {a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W, "
-        "{a.power_left:.2g} W more than dashpots take, though the level stays: this account says nothing",
-        "run longer, or to a smaller solver.tolerance",
+        "the level of vx does not change, but the energy does: friction gives {a.power_of_friction:.2g} W and the "
+        "roughness {a.power_of_roughness:.2g} W, {a.power_left:.2g} W more than dashpots take",
+        "run longer",
         longer=True,
     ),
     Row(
