@@ -210,7 +210,7 @@ bench-branch: $(DEV_STAMP) ## what branches of 200 random shoes cost, and how ma
 fingerprint: $(DEV_STAMP) ## compare all numbers of the working tree with those of a commit, BEFORE=v0.7.0 (some minutes)
 	$(BIN)/python -m benchmarks.fingerprint $(BEFORE)
 
-size: $(DEV_STAMP) ## count statements of the package, and what is longer than the house allows
+size: $(DEV_STAMP) ## weigh the package by its tokens, and name what is too long
 	$(BIN)/python -m benchmarks.size
 
 words: $(DEV_STAMP) ## count the words of the documentation outside code and tables
