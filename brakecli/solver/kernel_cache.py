@@ -1,11 +1,8 @@
 """The cache of compiled kernels on disk: where it is, its files with checksums, and who compiles what now."""
 
-import errno
 import fcntl
-import hashlib
 import io
 import os
-import stat
 import time
 import zlib
 from collections.abc import Iterator
@@ -18,35 +15,23 @@ from numba.core import caching as numba_caching
 from numba.core import codegen as numba_codegen
 from numba.core import config as numba_config
 
-from brakecli.solver import compiling
+from brakecli.solver import cache_folder, compiling
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 caching: Any = numba_caching  # has no types
 codegen: Any = numba_codegen  # has no types
 
 
-def source_hash(folder: Path = Path(__file__).parent) -> str:
-    """Hash of the sources of the solver: otherwise a cached caller would keep the old code of an edited helper."""
-    sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
-    return hashlib.sha256(sources).hexdigest()[:16]
-
-
 def _cache_directory() -> Path | None:
     """Where machine code is kept; None where nothing can be written, or where somebody else could write, too."""
     global _lock
-    base = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     try:
-        directory = (Path(base) if base else Path.home() / ".cache") / "brakecli" / source_hash()
-        directory.parent.mkdir(parents=True, exist_ok=True)
-        directory.mkdir(mode=0o700, exist_ok=True)
-        for each, others in ((directory.parent, 0), (directory, 0o022)):
-            found = each.lstat()
-            if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & others:
-                raise PermissionError(errno.EPERM, "it is not a folder in which this user alone writes", str(each))
+        directory = cache_folder.prepare()
         _lock = os.open(directory / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     except (OSError, RuntimeError) as error:
-        reason = f"{getattr(error, 'strerror', None) or error} (found {getattr(error, 'filename', None) or base})"
-        what = f"the cache of compiled kernels cannot be used: {reason[0].lower()}{reason[1:]}"
+        why = getattr(error, "strerror", None) or str(error)
+        where = getattr(error, "filename", None) or "the folder of caches"
+        what = f"the cache of compiled kernels cannot be used: {why[0].lower()}{why[1:]} (found {where})"
         compiling.set_trouble(f"{what}; name a folder of your own with XDG_CACHE_HOME")
         return None
     return directory

@@ -18,7 +18,7 @@ from brakecli.case import profile
 from brakecli.case.roughness import Record
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.front.inputs import load_sweep
-from brakecli.solver.kernel_cache import source_hash
+from brakecli.solver.cache_folder import source_hash
 from brakecli.sweeps.driver import sweep
 from brakecli.sweeps.journal import open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan

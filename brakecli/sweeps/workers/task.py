@@ -95,7 +95,7 @@ def fingerprint() -> Mapping[str, str]:
     They are those that this process has loaded: a long-lived worker does not notice changed files.
     """
     from brakecli.runs.run import versions
-    from brakecli.solver.kernel_cache import source_hash
+    from brakecli.solver.cache_folder import source_hash
 
     sources = source_hash(Path(about.__file__).parent)
     return {"brakecli_version": __version__, "brakecli_sources": sources, **versions()}

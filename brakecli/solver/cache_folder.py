@@ -1,0 +1,76 @@
+"""The folder of compiled kernels: where it is, and whether this user alone can write there.
+
+Kernels are machine code that runs as the user: who can write into their folder, or put another one in its place,
+runs what he likes. Only the standard library is imported here, so that the folder is known before Numba is.
+"""
+
+import errno
+import grp
+import hashlib
+import os
+import pwd
+import stat
+from pathlib import Path
+
+FOR_OTHERS = stat.S_IWGRP | stat.S_IWOTH
+"""Permissions by which others write into a folder."""
+OURS = 0o700
+"""Permissions of a folder that is made here, whatever the process hides by its mask."""
+
+
+def source_hash(folder: Path = Path(__file__).parent) -> str:
+    """Hash of the sources of the solver: otherwise a cached caller would keep the old code of an edited helper."""
+    sources = b"".join(path.read_bytes() for path in sorted(folder.rglob("*.py")))
+    return hashlib.sha256(sources).hexdigest()[:16]
+
+
+def prepare() -> Path:
+    """The folder of this version's kernels, made where it is missing.
+
+    Raises OSError where it cannot be made, and PermissionError where others could write there or swap it.
+    """
+    named = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    base = Path(named) if named else Path.home() / ".cache"
+    folder = base.absolute() / "brakecli" / source_hash()
+    for each in [*reversed(folder.parents), folder]:
+        if not each.exists():
+            each.mkdir(mode=OURS, exist_ok=True)
+    if folder.is_symlink():
+        raise _refused(folder, "it is a link")
+    real = folder.resolve()
+    for each in real.parents:
+        refuse_shared(each)
+    found = real.lstat()
+    if found.st_uid != os.geteuid() or found.st_mode & FOR_OTHERS:
+        raise _refused(folder, "it is not a folder in which this user alone writes")
+    return real
+
+
+def refuse_shared(folder: Path) -> None:
+    """Raise PermissionError where others could put something else in the place of what lies in a folder.
+
+    They can where they own it, or where they may write there without the sticky bit. A group of which the user is
+    the only member is no other.
+    """
+    found = folder.lstat()
+    if found.st_uid not in (0, os.geteuid()):
+        raise _refused(folder, "it belongs to another user")
+    shared = found.st_mode & FOR_OTHERS
+    if shared == stat.S_IWGRP and is_private(found.st_gid):
+        shared = 0
+    if shared and not found.st_mode & stat.S_ISVTX:
+        raise _refused(folder, "others may write there")
+
+
+def is_private(group: int) -> bool:
+    """Whether a group is the user's own, as many systems give to each: of his name, and without other members."""
+    try:
+        user = pwd.getpwuid(os.geteuid())
+        found = grp.getgrgid(group)
+    except KeyError:
+        return False
+    return user.pw_gid == group and found.gr_name == user.pw_name and set(found.gr_mem) <= {user.pw_name}
+
+
+def _refused(folder: Path, why: str) -> PermissionError:
+    return PermissionError(errno.EPERM, why, str(folder))
