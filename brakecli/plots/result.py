@@ -73,25 +73,16 @@ def _opened(
 
 
 def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", section: str = "") -> "Figure":
-    """The picture of an open result, drawn with the style that is set."""
-    from brakecli.plots import branch, comparison, curves, gather, lock_in, maps, run, scatter
-    from brakecli.plots import section as sections
-
+    """The picture of an open result, drawn with the style that is set; only what its kind needs is imported."""
     kind = str(result.attributes.get("kind"))
-    if section and (kind != "run" or variable):
-        what = (
-            f"is for runs, and {result.path} is a {printable(kind)}"
-            if kind != "run"
-            else "is a picture of its own"
-        )
-        raise UsageError(
-            f"{argument('section')} {section}: {what}; leave {'it' if kind != 'run' else argument('variable')} out"
-        )
+    _refuse_section(result, kind, variable, section)
     if kind == "sweep":
+        from brakecli.plots import curves, gather, maps
+
         picture = gather.gather(result, select, variable)
-        return curves.draw(picture) if len(picture.axes) == 1 and not picture.listed else maps.draw(picture)
-    others = {"comparison": comparison.draw, "stability": lock_in.draw, "scatter": scatter.draw}
-    if kind not in ("run", "branch", *others):
+        is_curve = len(picture.axes) == 1 and not picture.listed
+        return curves.draw(picture) if is_curve else maps.draw(picture)
+    if kind not in _KINDS:
         known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
         raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
     if select:
@@ -99,12 +90,42 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
             f"{result.path}: {argument('select')} is for sweeps (found {select[0]!r}); leave it out for a {kind}"
         )
     if section:
+        from brakecli.plots import section as sections  # waits for SciPy's splines
+
         return sections.draw(result, section)
     if kind == "run":
+        from brakecli.plots import run
+
         return run.draw(run.RunPicture(result, variable or "vx"))
     if kind == "branch":
+        from brakecli.plots import branch
+
         return branch.draw(result, variable)
     if variable:
         what = f"{argument('variable')} is for runs, sweeps and branches (found {variable!r})"
         raise UsageError(f"{result.path}: {what}; leave it out")
-    return others[kind](result)
+    if kind == "comparison":
+        from brakecli.plots import comparison
+
+        return comparison.draw(result)
+    if kind == "stability":
+        from brakecli.plots import lock_in
+
+        return lock_in.draw(result)
+    from brakecli.plots import scatter
+
+    return scatter.draw(result)
+
+
+_KINDS = ("run", "branch", "comparison", "stability", "scatter")
+"""Kinds of results that have a picture, beside sweeps."""
+
+
+def _refuse_section(result: StoredResult, kind: str, variable: str, section: str) -> None:
+    """Raise UsageError where a section is asked of what is no run, or beside a variable."""
+    if section and kind != "run":
+        what = f"is for runs, and {result.path} is a {printable(kind)}; leave it out"
+        raise UsageError(f"{argument('section')} {section}: {what}")
+    if section and variable:
+        what = f"is a picture of its own; leave {argument('variable')} out"
+        raise UsageError(f"{argument('section')} {section}: {what}")

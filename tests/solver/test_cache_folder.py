@@ -3,7 +3,6 @@
 import grp
 import os
 import pwd
-from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -15,7 +14,7 @@ ME = "somebody"
 
 
 @pytest.fixture
-def base(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+def base(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The folder that the environment names, in one of the user's own."""
     tmp_path.chmod(0o700)
     monkeypatch.delenv("NUMBA_CACHE_DIR", raising=False)
