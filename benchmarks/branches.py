@@ -19,7 +19,8 @@ from brakecli.branches.told import LIMIT_CYCLE
 from tests.analysis.shoes import Shoe, random_shoes
 from tests.examples import make
 
-SHOES, SEED = 200, 2500
+SHOES = 200
+SEED = 2500
 
 
 def drawn(number: int, seed: int) -> Iterator[tuple[int, dict[str, Any], float]]:
@@ -36,7 +37,9 @@ def drawn(number: int, seed: int) -> Iterator[tuple[int, dict[str, Any], float]]
 
 def main(number: int = SHOES, seed: int = SEED) -> None:
     """Follow the branches of so many shoes, and print times and ends."""
-    seconds, points, ends = list[float](), list[int](), Counter[str]()
+    seconds = list[float]()
+    points = list[int]()
+    ends = Counter[str]()
     for index, tables, critical in drawn(number, seed):
         begin = time.perf_counter()
         line = Line(make(tables), ["friction.coefficient"], 0.0, 2.0 * critical)
@@ -60,7 +63,9 @@ def main(number: int = SHOES, seed: int = SEED) -> None:
             print(
                 f"shoe {index}: {last.reason}, at {last.value:.6g} ({len(cycles[0].points)} points, {spent:.2f} s)"
             )
-    median, most, size = np.median(seconds), max(seconds), np.median(points)
+    median = np.median(seconds)
+    most = max(seconds)
+    size = np.median(points)
     print(f"{len(seconds)} branches: median {1e3 * median:.0f} ms, most {most:.2f} s; median {size:.0f} points")
     for what, count in ends.most_common():
         print(f"{count}: {what}")

@@ -29,8 +29,12 @@ from brakecli.solver.records import EVALUATE, LAYER, Layer
 from brakecli.solver.system import System
 
 CASES = Path(__file__).parents[1] / "cases" / "accuracy"
-REPEATS, CALLS = 40, 1000
-HEIGHT, DRIFT, REACH = -3e-5, 1e-7, 1e-9  # m: of the shoe, along the wheel between two evaluations, of the bound
+REPEATS = 40
+CALLS = 1000
+# m: of the shoe, along the wheel between two evaluations, of the bound
+HEIGHT = -3e-5
+DRIFT = 1e-7
+REACH = 1e-9
 FLAGS = ["-O3", "-march=native", "-ffast-math", "-shared", "-fPIC"]
 SOURCE = r"""
 #define _GNU_SOURCE
@@ -76,9 +80,11 @@ def _repeat(evaluate: int, layer: Layer, calls: int) -> None:
 
 def in_c(system: System, nodes: int) -> tuple[Callable[[], None], Floats]:
     """The evaluations in C, compiled for these nodes and waves; and the sums of the last."""
-    wheel, spacing = system.wheel, 2.0 * system.half_length / nodes
+    wheel = system.wheel
+    spacing = 2.0 * system.half_length / nodes
     with tempfile.TemporaryDirectory() as folder:
-        source, library = Path(folder, "contact.c"), Path(folder, "contact.so")
+        source = Path(folder, "contact.c")
+        library = Path(folder, "contact.so")
         source.write_text(SOURCE)
         sizes = [f"-DNODES={nodes}", f"-DWAVES={wheel.g.size}"]
         subprocess.run(["gcc", *FLAGS, *sizes, "-o", str(library), str(source), "-lm"], check=True)
@@ -91,7 +97,8 @@ def in_c(system: System, nodes: int) -> tuple[Callable[[], None], Floats]:
         ]
     )
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, wheel, nodes)
-    f1, sums = pad.tables[pad.constants.nodes_at :][:nodes], np.zeros(6)
+    f1 = pad.tables[pad.constants.nodes_at :][:nodes]
+    sums = np.zeros(6)
     arrays = [_in_lines(each) for each in (wheel.omega, f1, table.ravel(), sums, np.zeros(nodes + 6))]
     repeat.argtypes = [ctypes.c_long, *[ctypes.c_double] * 3, *[ctypes.c_void_p] * 5]
 

@@ -190,7 +190,9 @@ def calls(cases: list[str]) -> Iterator[Call]:
 
 def stick_slip() -> str:
     """A sawtooth with noise, as a measured force."""
-    rng, lines, force = np.random.default_rng(1), ["t,force"], 0.0
+    rng = np.random.default_rng(1)
+    lines = ["t,force"]
+    force = 0.0
     for index in range(20000):
         force = 0.0 if force > 1.0 + 0.2 * rng.random() else force + 0.01
         lines.append(f"{index * 1e-3},{force + 0.01 * rng.normal()}")
@@ -264,13 +266,15 @@ def of_hdf5(path: Path) -> Values:
 
 def difference(old: Any, new: Any) -> str:
     """How two values differ: empty, `words`, or by how much of the largest."""
-    old, new = np.asarray(old), np.asarray(new)
+    old = np.asarray(old)
+    new = np.asarray(new)
     if old.shape == new.shape and old.dtype.kind == new.dtype.kind and old.tobytes() == new.tobytes():
         return ""
     if old.shape == new.shape and old.dtype.kind in "OU" and (old == new).all():
         return ""
     if old.shape == new.shape and {old.dtype.kind, new.dtype.kind} <= set("fiub"):
-        old, new = old.astype(float), new.astype(float)
+        old = old.astype(float)
+        new = new.astype(float)
         if (np.isnan(old) != np.isnan(new)).any():
             return "missing values differ"
         apart, largest = (np.abs(np.nan_to_num(each)).max(initial=0.0) for each in (new - old, old))
@@ -285,9 +289,11 @@ def difference(old: Any, new: Any) -> str:
 
 def compare(before: dict[str, Values], after: dict[str, Values]) -> int:
     """Print what differs; how many numbers or names do."""
-    numbers, words = list[str](), list[str]()
+    numbers = list[str]()
+    words = list[str]()
     for name in before | after:
-        old, new = before.get(name, {}), after.get(name, {})
+        old = before.get(name, {})
+        new = after.get(name, {})
         for key in old | new:
             if any(part in key for part in (*TIMED, *CHOSEN * (name == "compare"))):
                 continue

@@ -43,11 +43,14 @@ def made_up(folder: Path, cluster: Cluster) -> None:
     loaded = write_sweep(folder, axis("friction.coefficient", *lines), axis("shoe.mass", *lines))
     crew = [cluster.worker("--no-nanny").pid for _ in range(2)]
     for size in (100, 10_000):
-        begin, own = time.perf_counter(), time.process_time()
+        begin = time.perf_counter()
+        own = time.process_time()
         others = [processor_seconds(each) for each in (cluster.scheduler.pid, *crew)]
         with ClusterEngine(partial(quick, loaded.plan), cluster.address, None) as engine:
             sweep(loaded, folder / "s.h5", engine, force=True, task_size=size)
-        seconds, tasks, parent = time.perf_counter() - begin, MADE_UP // size, time.process_time() - own
+        seconds = time.perf_counter() - begin
+        tasks = MADE_UP // size
+        parent = time.process_time() - own
         now = [processor_seconds(each) for each in (cluster.scheduler.pid, *crew)]
         scheduler, *workers = (after - before for after, before in zip(now, others, strict=True))
         print(
@@ -92,7 +95,8 @@ def rough(folder: Path, cluster: Cluster, points: int) -> None:
     few = swept(folder, cluster, crew, FEW)
     begin = time.perf_counter()
     found = swept(folder, cluster, crew, points)
-    seconds, points = time.perf_counter() - begin, write_rough(folder, points)
+    seconds = time.perf_counter() - begin
+    points = write_rough(folder, points)
     size = (folder / "map.h5").stat().st_size
     parent, scheduler, workers, memory = (one - other for one, other in zip(found, few, strict=True))
     more = points - FEW
@@ -111,7 +115,8 @@ def rough(folder: Path, cluster: Cluster, points: int) -> None:
 
 def killed(folder: Path, cluster: Cluster, points: int) -> None:
     """Workers are killed at a fifth and two fifths of the journal, the command at a third and at three fifths."""
-    output, crew = folder / "killed.h5", [cluster.worker("--no-nanny") for _ in range(WORKERS)]
+    output = folder / "killed.h5"
+    crew = [cluster.worker("--no-nanny") for _ in range(WORKERS)]
     points = write_rough(folder, points)
     whole = 0
 

@@ -31,7 +31,9 @@ DURATIONS = (0.02, 0.2, 0.5)
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5)
 CHOSEN = Method("event-driven", automatic=True)
 EXACT = Method("event-driven", tolerance=1e-10)
-TURNS, SLOW = 25, 5.0  # turns of an entry and a promise, and seconds after which there is none more
+# turns of an entry and a promise, and seconds after which there is none more
+TURNS = 25
+SLOW = 5.0
 
 
 def entries(system: System, exact: Floats) -> Iterator[tuple[float, float, Method]]:
@@ -54,7 +56,8 @@ def entries(system: System, exact: Floats) -> Iterator[tuple[float, float, Metho
 def cell(system: System, tried: list[tuple[float, float, Method]], exact: Floats, tolerance: float) -> str:
     """Time of the cheapest entry and of the promise (ms), and their ratio."""
     able = sorted((seconds, number) for number, (seconds, error, _) in enumerate(tried) if error <= tolerance)
-    alone, promise = {number: math.inf for _, number in able[:5]}, list[float]()
+    alone = {number: math.inf for _, number in able[:5]}
+    promise = list[float]()
     promised = replace(system, method=replace(CHOSEN, tolerance=tolerance))
     while len(promise) < TURNS and sum(promise) < SLOW:
         for number in alone:
@@ -65,7 +68,8 @@ def cell(system: System, tried: list[tuple[float, float, Method]], exact: Floats
         found = certify(promised)
         promise.append(process_time() - begin)
     best = min(alone, key=lambda number: alone[number])
-    error, ratio = errors(found.motion.rows, exact).error, min(promise) / alone[best]
+    error = errors(found.motion.rows, exact).error
+    ratio = min(promise) / alone[best]
     method = tried[best][2]
     print(f"# {tolerance:g}: {method_label(method)}, {method.step or method.tolerance:.3g}", file=sys.stderr)
     print(f"# {found.certificate.sentence()}, {error:.1e} in truth", file=sys.stderr, flush=True)

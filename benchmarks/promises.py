@@ -37,7 +37,8 @@ TRUTH = 1e-12
 
 def random_case(rng: np.random.Generator, kind: str) -> Case:
     """A case of a kind, as likely as not unstable."""
-    mass, c_1 = 10.0 ** rng.uniform(-0.5, 1.5), 10.0 ** rng.uniform(6.0, 7.5)
+    mass = 10.0 ** rng.uniform(-0.5, 1.5)
+    c_1 = 10.0 ** rng.uniform(6.0, 7.5)
     contact = c_1 * 10.0 ** rng.uniform(-1.0, 0.7)
     c_2 = (c_1 + contact) * 10.0 ** rng.uniform(-0.3, 0.3)
     damping = 10.0 ** rng.uniform(-2.7, -1.3) * math.sqrt(mass)
@@ -87,7 +88,8 @@ def fits(rows: np.ndarray[Any, Any], kind: str) -> bool:
     """Whether a motion does what its kind says."""
     states = rows[:, list(HISTORY).index("state")]
     fraction = rows[:, list(HISTORY).index("contact_fraction")]
-    sticks, lifts = (states == ContactState.STICK).any(), (states == ContactState.SEPARATED).any()
+    sticks = (states == ContactState.STICK).any()
+    lifts = (states == ContactState.SEPARATED).any()
     if kind == "flat, sliding":
         return not sticks
     if kind == "flat, sticking or lifting":

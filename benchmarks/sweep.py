@@ -82,7 +82,8 @@ def early(folder: Path) -> None:
                 compute(plan, first, min(size, plan.points - first))
             times.append((time.process_time() - begin) / (len(chunks) * size))
         print(f"{what}: {1e3 * min(times):.2f} ms of a core (least of 5)")
-    report_seconds, size = seconds(loaded, 2, folder), (folder / "sweep.h5").stat().st_size
+    report_seconds = seconds(loaded, 2, folder)
+    size = (folder / "sweep.h5").stat().st_size
     print(f"10,000 points on two workers: {report_seconds:.1f} s, {size / 10_000:.0f} bytes a point in the file")
 
 
@@ -95,12 +96,14 @@ def main() -> None:
         print(f"200 points of {alone(loaded, 20, 1):.3f} s")
         ratios = []
         for turn in range(ROUNDS):
-            one, two = seconds(loaded, 1, folder), seconds(loaded, 2, folder)
+            one = seconds(loaded, 1, folder)
+            two = seconds(loaded, 2, folder)
             ratios.append(one / two)
             print(f"round {turn + 1}: one worker {one:.2f} s, two {two:.2f} s: {ratios[-1]:.3f} times", flush=True)
         print(f"two workers give {statistics.median(ratios):.3f} times one (median of {ROUNDS})")
         small = load(folder, 20_000, 5e-4)
-        each, swept = alone(small, 20, 100) * 1e3, seconds(small, 1, folder) / 20_000 * 1e3
+        each = alone(small, 20, 100) * 1e3
+        swept = seconds(small, 1, folder) / 20_000 * 1e3
         print(f"small points: {each:.2f} ms each alone, {swept:.2f} ms in a sweep on one worker", end=": ")
         print(f"{swept - each:.2f} ms of overhead a point")
         early(folder)

@@ -44,7 +44,8 @@ def main() -> None:
         if path.name not in WRITTEN | {"CHANGELOG.md"} and ".template" not in path.name:
             sentences = [len(each.split()) for each in re.split(r"(?<=[.?!:])\s+|\n\s*\n|\n[-*]\s", prose(path))]
             sentences = [count for count in sentences if count > 1]
-            words, long = sum(sentences), sum(count > 30 for count in sentences)
+            words = sum(sentences)
+            long = sum(count > 30 for count in sentences)
             total += words
             print(f"{words:6d} {median(sentences):7.0f} {long:10d} {path.relative_to(ROOT)}")
     print(f"{total:6d} in all")

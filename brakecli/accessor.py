@@ -66,7 +66,8 @@ class Shown:
 
     def _repr_html_(self) -> str:
         """The table and the picture."""
-        png, text = self._repr_png_(), f"<pre>{html.escape(self.table())}</pre>"
+        png = self._repr_png_()
+        text = f"<pre>{html.escape(self.table())}</pre>"
         data = base64.b64encode(png).decode() if png else ""
         return text + f'<img src="data:image/png;base64,{data}" style="max-width: 100%">' * bool(png)
 

@@ -11,7 +11,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-_LONGEST, _SHOWN = 80, 5  # characters of a value in a message, and entries of a list
+# characters of a value in a message, and entries of a list
+_LONGEST = 80
+_SHOWN = 5
 _ODD = {"Cc", "Cf", "Cn", "Co", "Cs", "Zl", "Zp"}  # categories of Unicode
 KeyPath = tuple[str | int, ...]
 """The names of the tables and of the key, from the top of a file on; a number is a place in a list."""

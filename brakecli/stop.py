@@ -16,7 +16,8 @@ try:
     os.set_blocking(_file, False)
     memory: bytearray | mmap.mmap = mmap.mmap(_file, mmap.PAGESIZE)
 except (AttributeError, OSError):  # some systems have no such files: kernels then see no signal
-    _file, memory = -1, bytearray(8)
+    _file = -1
+    memory = bytearray(8)
 """The first byte of `memory` is the number of the first signal, or 0; its address never changes."""
 
 

@@ -17,7 +17,9 @@ from brakecli.cli import app
 
 HERE = Path(__file__).parent
 
-project, author, release = "brakecli", "the authors of brakecli", brakecli.__version__
+project = "brakecli"
+author = "the authors of brakecli"
+release = brakecli.__version__
 extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.napoleon"]
 exclude_patterns = ["_site", "generated", "*.template.md"]
 source_suffix = {".md": "myst-nb"}
@@ -40,7 +42,8 @@ autodoc_typehints = "description"
 
 def write_commands(site: Sphinx) -> None:
     """Write the help of every command, as the program prints it."""
-    parts, terminal = list[str](), {"COLUMNS": "80", "LANG": "C.UTF-8"}
+    parts = list[str]()
+    terminal = {"COLUMNS": "80", "LANG": "C.UTF-8"}
     for name in ("", *app.COMMANDS):
         line = [sys.executable, "-m", "brakecli", *name.split(), "--help"]
         done = subprocess.run(line, capture_output=True, text=True, check=True, env=terminal)

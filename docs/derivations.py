@@ -133,12 +133,11 @@ def three_layer_positions() -> None:
 @check
 def three_layer_minimum() -> None:
     """(14): the gradient of the smooth part of J_1 is the two brackets of (11), at the force F."""
-    a_11, a_12, a_22 = (
-        2 * m / h + b_xx + 2 * c_xx * h * theta_1,
-        b_xy + 2 * c_xy * h * theta_1,
-        2 * m / h + b_yy + 2 * c_yy * h * theta_1,
-    )
-    x_part, y_part = theta_2 * x_now + (theta_3 + theta_1) * x_old, theta_2 * y_now + (theta_3 + theta_1) * y_old
+    a_11 = 2 * m / h + b_xx + 2 * c_xx * h * theta_1
+    a_12 = b_xy + 2 * c_xy * h * theta_1
+    a_22 = 2 * m / h + b_yy + 2 * c_yy * h * theta_1
+    x_part = theta_2 * x_now + (theta_3 + theta_1) * x_old
+    y_part = theta_2 * y_now + (theta_3 + theta_1) * y_old
     g_1 = 2 * m * (x_now - x_old) / h / h - c_xx * x_part - c_xy * y_part - Q_x
     g_2 = 2 * m * (y_now - y_old) / h / h - c_yy * y_part - c_xy * x_part + F - Q_y
     along, across = three_layer_rows()
@@ -153,7 +152,10 @@ def two_layer_rows(sign: int = 1) -> tuple[sp.Expr, sp.Expr]:
 
     x = x_now + h * (theta_2 * p + (1 - theta_2) * p_now)
     y = y_now + h * (theta_2 * q + (1 - theta_2) * q_now)
-    p_mean, q_mean, x_mean, y_mean = mean(p, p_now), mean(q, q_now), mean(x, x_now), mean(y, y_now)
+    p_mean = mean(p, p_now)
+    q_mean = mean(q, q_now)
+    x_mean = mean(x, x_now)
+    y_mean = mean(y, y_now)
     along = m * (p - p_now) / h + b_xx * p_mean + c_xx * x_mean + b_xy * q_mean + c_xy * y_mean + Q_x
     across = m * (q - q_now) / h + b_yy * q_mean + c_yy * y_mean + sign * b_xy * p_mean + c_xy * x_mean - F + Q_y
     return along, across
@@ -179,11 +181,9 @@ def two_layer_substituted() -> None:
 @check
 def two_layer_minimum() -> None:
     """(25): the gradient of the smooth part of J_2 is the two brackets of (23); the printed g_1, g_2 are not."""
-    a_11, a_12, a_22 = (
-        m / h + theta_1 * (b_xx + theta_2 * c_xx * h),
-        theta_1 * (b_xy + theta_2 * c_xy * h),
-        m / h + theta_1 * (b_yy + theta_2 * c_yy * h),
-    )
+    a_11 = m / h + theta_1 * (b_xx + theta_2 * c_xx * h)
+    a_12 = theta_1 * (b_xy + theta_2 * c_xy * h)
+    a_22 = m / h + theta_1 * (b_yy + theta_2 * c_yy * h)
 
     def old(b: sp.Expr, c: sp.Expr) -> sp.Expr:
         return (1 - theta_1) * b + theta_1 * (1 - theta_2) * c * h
@@ -308,7 +308,8 @@ def scalar_step() -> None:
         zero(slip_d.diff(F) + (a_12 + side * phi * a_22) / a, slip_e.diff(F) - (a_11 + side * phi * a_12) / a)
     zero(((g_2 + F - a_12 * U) / a_22).diff(F) - 1 / a_22)
     contact = sp.Function("F_y")
-    slip_d, slip_e = sp.Function("d")(F), sp.Function("e")(F)
+    slip_d = sp.Function("d")(F)
+    slip_e = sp.Function("e")(F)
     slope = (contact(x0 + w * slip_d, y0 + w * slip_e) - F).diff(F).doit()
     at_x, at_y = sp.symbols("at_x at_y", real=True)
     G = contact(at_x, at_y).diff(at_x).subs({at_x: x0 + w * slip_d, at_y: y0 + w * slip_e})
@@ -345,7 +346,8 @@ def touching_interval() -> None:
     """(2) on one touching interval: dF_y/dy = -k length, dF_y/dx = k [f_2] between its ends."""
     k = sp.Symbol("k", positive=True)
     xi, s, y, left, right = sp.symbols("xi s y left right", real=True)
-    f_1, f_2 = sp.Function("f_1"), sp.Function("f_2")
+    f_1 = sp.Function("f_1")
+    f_2 = sp.Function("f_2")
     gap = f_2(xi + s) - f_1(xi) - y  # vanishes at the ends, so that moving ends add nothing
     zero(sp.integrate(k * gap.diff(y), (xi, left, right)) + k * (right - left))
     primitive = k * f_2(xi + s)
@@ -386,8 +388,10 @@ def flutter_and_divergence() -> None:
 def least_critical_friction() -> None:
     """beta = 0: the least phi_cr over c_2 is (1 + c_1/K) tan alpha, at c_2 = c_1 + K."""
     c_1, c_2, K, alpha = sp.symbols("c_1 c_2 K alpha", positive=True)
-    sine, cosine = sp.sin(alpha), sp.cos(alpha)
-    size, difference = c_2 * sine * cosine, c_2 * cosine**2 - (c_1 + c_2 * sine**2) - K
+    sine = sp.sin(alpha)
+    cosine = sp.cos(alpha)
+    size = c_2 * sine * cosine
+    difference = c_2 * cosine**2 - (c_1 + c_2 * sine**2) - K
     flutter = (size + difference**2 / (4 * size)) / K
     slope = (c_2**2 - (c_1 + K) ** 2) / (4 * K * c_2**2 * sine * cosine)  # negative below c_1 + K, positive above
     zero(sp.simplify(flutter.diff(c_2) - slope))
@@ -401,8 +405,11 @@ def least_critical_friction() -> None:
 def mode_coupling_numbers() -> None:
     """Minimal model of mode coupling: critical at 3/4 with w^2 = 2; growth and frequency at phi = 1."""
     root = sp.sqrt(3)
-    c_1, c_2, K = sp.Rational(2, 3) * (2 - root), sp.Rational(2, 3) * (2 + root), sp.Rational(4, 3)
-    alpha, beta = sp.pi / 6, sp.pi / 3
+    c_1 = sp.Rational(2, 3) * (2 - root)
+    c_2 = sp.Rational(2, 3) * (2 + root)
+    K = sp.Rational(4, 3)
+    alpha = sp.pi / 6
+    beta = sp.pi / 3
     xx = c_1 * sp.sin(beta) ** 2 + c_2 * sp.cos(alpha) ** 2
     xy = c_1 * sp.sin(beta) * sp.cos(beta) - c_2 * sp.sin(alpha) * sp.cos(alpha)
     yy = c_1 * sp.cos(beta) ** 2 + c_2 * sp.sin(alpha) ** 2
@@ -410,7 +417,8 @@ def mode_coupling_numbers() -> None:
     zero((-xy + (xx - yy - K) ** 2 / (-4 * xy)) / K - sp.Rational(3, 4))
     # x'' + M x = 0 with M = [[2, -1 + 4 phi/3], [-1, 2]] has (lambda^2 + 2)^2 = 1 - 4 phi/3
     square = -2 + sp.I * sp.sqrt(sp.Rational(1, 3))
-    growth, frequency = sp.sqrt((sp.Abs(square) - 2) / 2), sp.sqrt((sp.Abs(square) + 2) / 2)
+    growth = sp.sqrt((sp.Abs(square) - 2) / 2)
+    frequency = sp.sqrt((sp.Abs(square) + 2) / 2)
     zero((growth + sp.I * frequency) ** 2 - square)
     close(growth, 0.2020717687680948)
     close(frequency, 1.4285772641803685)
@@ -423,7 +431,8 @@ def coulomb_oscillator_numbers() -> None:
     zero(peak - (sp.sqrt(205) - 1))
     turns = 0
     while peak > 1:  # beyond 1 the spring breaks it loose: half a circle about +1 or -1
-        peak, turns = peak - 2, turns + 1
+        peak = peak - 2
+        turns = turns + 1
     if turns != 7:
         raise ArithmeticError(f"{turns} half cycles")
     close(-peak, 0.6821789367236466)  # the seventh half cycle ends beyond zero, on the side it started from
@@ -462,7 +471,8 @@ def energy_account() -> None:
 @check
 def scheme_energy() -> None:
     """Energy: what weights other than one half (two-layer) and theta_1 = theta_3 (three-layer) take out."""
-    half, quarter = sp.Rational(1, 2), sp.Rational(1, 4)
+    half = sp.Rational(1, 2)
+    quarter = sp.Rational(1, 4)
     move = (theta_2 * p + (1 - theta_2) * p_now) * h
     inertia = m * (p - p_now) / h * move - m * (p**2 - p_now**2) / 2
     zero(inertia - m * (theta_2 - half) * (p - p_now) ** 2)
@@ -488,9 +498,11 @@ def linear_phases() -> None:
     resist_y = b_xy * v_x + b_yy * v_y + c_xy * x + c_yy * y + Q * cos
     needed = m * slope + resist_x.subs(v_x, U)
     for side, touching in ((-1, 1), (0, 1), (1, 1), (0, 0)):
-        pressed, sticks = -touching * K * y, side == 0 and touching == 1
+        pressed = -touching * K * y
+        sticks = side == 0 and touching == 1
         force = needed if sticks else -side * phi * pressed
-        a_x, a_y = slope if sticks else (force - resist_x) / m, (pressed - resist_y) / m
+        a_x = slope if sticks else (force - resist_x) / m
+        a_y = (pressed - resist_y) / m
         at_wheel = {v_x: U} if sticks else {}
         zero((m * a_x + resist_x - force).subs(at_wheel), m * a_y + resist_y - pressed)  # (6) and (7)
         margins = (pressed, side * (v_x - U)) if not sticks else (phi * pressed - needed, phi * pressed + needed)
@@ -521,7 +533,8 @@ def routh_hurwitz() -> None:
     from brakecli.analysis.stability.modes import routh_hurwitz as conditions
 
     m, k, phi, s = sp.symbols("m K phi s", positive=True)
-    b, c = sp.symbols("b_xx b_xy b_yy", real=True), sp.symbols("c_xx c_xy c_yy", real=True)
+    b = sp.symbols("b_xx b_xy b_yy", real=True)
+    c = sp.symbols("c_xx c_xy c_yy", real=True)
     determinant, apart = conditions(m, b, c, k, phi, damped=True)
     matrix = m * s**2 * sp.eye(2) + sp.Matrix([[0, phi * k], [0, k]])
     matrix += sp.Matrix(2, 2, lambda i, j: s * b[int(i + j)] + c[int(i + j)])

@@ -53,7 +53,9 @@ def touching_by_load(results: Results) -> list[float]:
 
 def agreement(results: Results) -> str:
     """How far simulation and eigenvalues are apart, over all points; those beyond the error bar one by one."""
-    apart, beyond, count = [], [], 0
+    apart = []
+    beyond = []
+    count = 0
     for name, data in sorted(
         [
             *results.sweeps.items(),
@@ -118,7 +120,8 @@ def regimes(results: Results) -> str:
     for name in ("regimes-flat", "regimes-rough"):
         data = results[name]
         for i, j in np.argwhere(data.regime.values == "undecided"):
-            phi, speed = float(data.friction_coefficient[i]), 0.5 * float(data.wheel_angular_speed[j])
+            phi = float(data.friction_coefficient[i])
+            speed = 0.5 * float(data.wheel_angular_speed[j])
             reasons.append(f"- `{name}`, φ = {phi:g}, U = {speed:.3g} m/s: {data.reason.values[i, j]}")
     return text + ("\n\nUndecided, with the reason:\n\n" + "\n".join(reasons) if reasons else "")
 
@@ -126,7 +129,8 @@ def regimes(results: Results) -> str:
 def alpha_smooth(results: Results) -> str:
     """Smooth surfaces at c2 = c1 + K."""
     at = results["alpha-flat"].sel({C2: 1.2e7})
-    none, both = at.sel({BOTH: 0.0}), at.sel({BOTH: 300.0})
+    none = at.sel({BOTH: 0.0})
+    both = at.sel({BOTH: 300.0})
     rows = [
         [
             f"{angle:g}",
@@ -154,7 +158,8 @@ def alpha_smooth(results: Results) -> str:
 
 def alpha_rough(results: Results) -> str:
     """Rough surfaces at c2 = c1 + K."""
-    rough, opened = results["alpha-rough"], results["alpha-open"]
+    rough = results["alpha-rough"]
+    opened = results["alpha-open"]
     rows = []
     for i, angle in enumerate(rough[ALPHA].values):
         row = [f"{angle:g}"]
@@ -172,11 +177,13 @@ def alpha_rough(results: Results) -> str:
 
 def straightness(results: Results) -> str:
     """Distances from straight lines in α."""
-    flat, rows = results["alpha-flat"], []
+    flat = results["alpha-flat"]
+    rows = []
 
     def add(words: str, angle: Array, friction: Array) -> None:
         kept = angle >= FIRST_ANGLE
-        x, y = angle[kept], friction[kept]
+        x = angle[kept]
+        y = friction[kept]
         pairs = [f"{nonlinearity(x, y, reach, affine):.1f}" for affine in (False, True) for reach in RANGES]
         rows.append([words, *pairs])
 
@@ -206,8 +213,10 @@ def straightness(results: Results) -> str:
 
 def beta(results: Results) -> str:
     """By the angle of link 1."""
-    data, rough = results["beta-flat"], results["beta-rough"]
-    none, both = data.sel({BOTH: 0.0}), data.sel({BOTH: 300.0})
+    data = results["beta-flat"]
+    rough = results["beta-rough"]
+    none = data.sel({BOTH: 0.0})
+    both = data.sel({BOTH: 300.0})
     rows = []
     for i, angle in enumerate(data[BETA].values):
         closed = float(flutter(1.2e7, 5.0, float(angle), KB))
@@ -228,7 +237,8 @@ def beta(results: Results) -> str:
 
 def beta_straightness(results: Results) -> str:
     """Distances from straight lines in β, and their slopes."""
-    data, rows = results["beta-flat"], []
+    data = results["beta-flat"]
+    rows = []
     for first in (-5.0, -15.0, -30.0):
         row = [f"{first:g}° to 4°"]
         for damping in (0.0, 300.0):
@@ -318,7 +328,8 @@ def single_dashpots(results: Results) -> str:
     """One dashpot alone: closed forms against both methods."""
     rows = []
     for share in RATIOS:
-        fine, wide = results.refined[share].isel({K: 0}), results["ratio-eigenvalues"].sel({K: share * C1 / PAD})
+        fine = results.refined[share].isel({K: 0})
+        wide = results["ratio-eigenvalues"].sel({K: share * C1 / PAD})
         row = [f"{share:g}"]
         for first, second in ((300.0, 0.0), (0.0, 300.0)):
             at = {FIRST: first, SECOND: second}

@@ -11,7 +11,12 @@ from matplotlib.figure import Figure
 from paper_results import BETA, BOTH, C1, C2, FIRST, PAD, RATIOS, SECOND, K, Results, flutter
 
 DOCS = Path(__file__).parent
-BLUE, ORANGE, VERMILION, GREEN, PURPLE, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#CC79A7", "#9A9A9A"
+BLUE = "#0072B2"
+ORANGE = "#E69F00"
+VERMILION = "#D55E00"
+GREEN = "#009E73"
+PURPLE = "#CC79A7"
+GREY = "#9A9A9A"
 STYLE = {
     "font.size": 9.5,
     "axes.titlesize": 10.5,
@@ -86,7 +91,9 @@ def alpha(results: Results) -> None:
     """The critical friction coefficient by the angle of link 2."""
     figure, axes = panels(9.6, 2)
     angles = np.linspace(0.5, 30.0, 200)
-    flat, rough, opened = results["alpha-flat"], results["alpha-rough"], results["alpha-open"]
+    flat = results["alpha-flat"]
+    rough = results["alpha-rough"]
+    opened = results["alpha-open"]
     at = flat.sel({C2: 1.2e7})
     axes[0].plot(angles, flutter(1.2e7, angles, 0.0, KB), "--", color=BLUE, lw=1.0, label="(1 + c1/K) tan α")
     for data, colour, marker, words in (
@@ -121,7 +128,8 @@ def alpha(results: Results) -> None:
 def beta(results: Results) -> None:
     """The critical friction coefficient by the angle of link 1."""
     figure, axes = panels(9.6, 2)
-    data, locking = results["beta-flat"], results["beta-locking"]
+    data = results["beta-flat"]
+    locking = results["beta-locking"]
     angles = np.linspace(-30.0, 5.95, 400)
     axes[0].plot(angles, flutter(1.2e7, 5.0, angles, KB), "--", color=GREY, label="closed form, no dashpots")
     for damping, colour in ((0.0, BLUE), (300.0, VERMILION)):
@@ -148,7 +156,9 @@ def ratio(results: Results) -> None:
     """The critical friction coefficient by the stiffness of link 2."""
     figure, axes = panels(9.6, 2)
     stiffness = np.linspace(0.5e7, 3.2e7, 800)
-    wide, fine, opened = results["ratio-flat"], results["ratio-eigenvalues"], results["ratio-open"]
+    wide = results["ratio-flat"]
+    fine = results["ratio-eigenvalues"]
+    opened = results["ratio-open"]
     for share, colour in zip(RATIOS, (PURPLE, ORANGE, BLUE, GREEN), strict=True):
         k = share * C1
         axes[0].plot(stiffness / C1, flutter(stiffness, 5.0, 0.0, k), "--", color=colour, lw=0.9)

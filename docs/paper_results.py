@@ -17,7 +17,8 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 
 ROOT = Path(__file__).parents[1]
-CASES, RESULTS = ROOT / "cases" / "paper", ROOT / "results" / "paper"
+CASES = ROOT / "cases" / "paper"
+RESULTS = ROOT / "results" / "paper"
 COMMAND = Path(sys.executable).with_name("brakecli")
 C1 = 1e7
 PAD = 0.1
@@ -25,8 +26,13 @@ RATIOS = (0.02, 0.05, 0.2, 1.0)
 RANGES = (10.0, 20.0, 30.0)
 WINDOW = np.array([-0.05, -0.025, 0.0, 0.025, 0.05])
 """Around the least value on the coarse grid: where it is looked for again, by simulation."""
-ALPHA, BETA, C2, K = "link2_angle_deg", "link1_angle_deg", "link2_stiffness", "contact_stiffness"
-BOTH, FIRST, SECOND = "link1_damping", "link1_damping", "link2_damping"
+ALPHA = "link2_angle_deg"
+BETA = "link1_angle_deg"
+C2 = "link2_stiffness"
+K = "contact_stiffness"
+BOTH = "link1_damping"
+FIRST = "link1_damping"
+SECOND = "link2_damping"
 Array = NDArray[np.float64]
 
 
@@ -123,7 +129,8 @@ def touching(name: str, **changes: dict[str, Any]) -> float:
 def nonlinearity(angle: Array, friction: Array, reach: float, affine: bool) -> float:
     """The largest distance from the best straight line, in per cent of the largest value from 0 to `reach`."""
     kept = angle <= reach + 1e-9
-    x, y = angle[kept], friction[kept]
+    x = angle[kept]
+    y = friction[kept]
     columns = np.stack([x, np.ones_like(x)], axis=1) if affine else x[:, None]
     line = columns @ np.linalg.lstsq(columns, y, rcond=None)[0]
     return float(100.0 * np.abs(y - line).max() / y.max())
@@ -131,7 +138,8 @@ def nonlinearity(angle: Array, friction: Array, reach: float, affine: bool) -> f
 
 def flutter(c2: Array | float, alpha: Array | float, beta: Array | float, k: float) -> Array:
     """The closed form without dashpots, NaN where there is no flutter (angles in degrees)."""
-    a, b = np.radians(alpha), np.radians(beta)
+    a = np.radians(alpha)
+    b = np.radians(beta)
     pull = 0.5 * (np.asarray(c2) * np.sin(2.0 * a) - C1 * np.sin(2.0 * b))  # -cxy
     apart = c2 * np.cos(2.0 * a) - C1 * np.cos(2.0 * b) - k  # cxx - cyy - K
     pull = np.where(pull > 0.0, pull, np.nan)

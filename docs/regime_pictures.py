@@ -27,7 +27,9 @@ from brakecli.solver.quantities import ContactState
 
 DOCS = Path(__file__).parent
 CASES = DOCS.parent / "cases"
-RUN, STICK, JUDGED = "#5B9BC8", "#3A3A3A", "#E9EEF3"
+RUN = "#5B9BC8"
+STICK = "#3A3A3A"
+JUDGED = "#E9EEF3"
 COLUMNS = 400  # of a panel, in each of which the least and the largest vx are drawn
 STRIPS = 80  # of a panel, in each of which it is shown whether the shoe sticks
 COLOURS = 64  # of a picture: enough for smooth edges of few hues, in a file of moderate size
@@ -276,7 +278,8 @@ def band(axis: Axes, shown: Shown, width: float, colour: str) -> None:
     axis.fill_between(middle, low, high, color=colour, lw=0.6)
     edges = _edges(len(shown.time), STRIPS * part)
     sticks = np.maximum.reduceat(shown.state == ContactState.STICK, edges[:-1])
-    begins, lengths = shown.time[edges[:-1]][sticks], np.diff(shown.time[edges])[sticks]
+    begins = shown.time[edges[:-1]][sticks]
+    lengths = np.diff(shown.time[edges])[sticks]
     axis.bar(begins, 0.045, lengths, align="edge", color=STICK, transform=axis.get_xaxis_transform())
 
 
@@ -287,7 +290,9 @@ def _edges(samples: int, parts: float) -> NDArray[np.int64]:
 
 def level(evidence: dict[str, Any]) -> str:
     """Whether it lasts, in words."""
-    limits, change, error = Thresholds(), evidence["change"], evidence["change_error"]
+    limits = Thresholds()
+    change = evidence["change"]
+    error = evidence["change_error"]
     steady = abs(change) <= max(limits.sure_errors * error, 2.0 * limits.settled_within)
     word = "grows" if change > 0.0 else "falls"
     if steady:

@@ -39,7 +39,8 @@ def rows(name: str, old: str) -> str:
     words = dict(CELLS.findall(old))
     lines = ["", "| row | where | verdict | what to do |", "|---|---|---|---|"]
     for row in getattr(verdicts, name):
-        where, remedy = words.get(row.name, UNKNOWN), re.sub(r"\{.*?\}", "…", row.remedy)
+        where = words.get(row.name, UNKNOWN)
+        remedy = re.sub(r"\{.*?\}", "…", row.remedy)
         lines.append(f"| {row.name} | {where} | {verdict(row)} | {remedy} |".replace("|  |", "| |"))
     return "\n".join([*lines, "", ""])
 
@@ -53,7 +54,8 @@ def verdict(row: Row[Any, Any]) -> str:
 
 def main() -> int:
     """Write the pages, or compare them."""
-    code, check = 0, "--check" in sys.argv
+    code = 0
+    check = "--check" in sys.argv
     for name in PAGES:
         page = Path(__file__).parent / f"{name}.md"
         old = page.read_text()

@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-campaign, statistics = pytest.mark.campaign, pytest.mark.statistics
+campaign = pytest.mark.campaign
+statistics = pytest.mark.statistics
 
 
 def counts(few: int, many: int, most: int = 0) -> list[Any]:

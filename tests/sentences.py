@@ -20,7 +20,9 @@ def unknown_in(value: Any) -> list[str]:
 
 def read_all() -> None:
     """From now on, fail wherever a verdict or a result holds such a text."""
-    decision, verdict, read = Row.decision, Verdict.__init__, Field.read
+    decision = Row.decision
+    verdict = Verdict.__init__
+    read = Field.read
 
     def decision_read(self: Row[Any, Any], answers: Any) -> Decision:
         found = decision(self, answers)

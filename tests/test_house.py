@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.size import is_packed, is_starred
+from benchmarks.size import is_packed
 from tests.commands import ROOT
 
 PACKAGE = ROOT / "brakecli"
@@ -82,7 +82,8 @@ def shared_names(text: str) -> Iterator[str]:
         if isinstance(node, ast.AnnAssign) and "..." not in ast.unparse(node.annotation):
             pairs = [(node.target, node.value)]
         elif isinstance(node, ast.Assign):
-            names, values = node.targets[0], node.value
+            names = node.targets[0]
+            values = node.value
             apart = isinstance(names, ast.Tuple) and isinstance(values, ast.Tuple)
             pairs = [*zip(names.elts, values.elts, strict=True)] if apart else [(names, values)]  # type: ignore[attr-defined]
         yield from (name.id for name, value in pairs if isinstance(name, ast.Name) and holds_numbers(value))
@@ -145,47 +146,4 @@ def test_every_assignment_has_a_line_of_its_own() -> None:
     ]
     found = {str(path.relative_to(ROOT)): wrong for path in paths if (wrong := packed(path.read_text()))}
     assert len(paths) > 400
-    assert not found
-
-
-MOST_FIELDS = 3
-"""Fields of a record that starred arguments may fill: of more nobody sees which gets what."""
-
-
-def records(trees: list[ast.Module]) -> dict[str, int]:
-    """How many fields each record of the package has, by its name."""
-    found = dict[str, int]()
-    for node in [each for tree in trees for each in ast.walk(tree)]:
-        if isinstance(node, ast.ClassDef):
-            kinds = [ast.unparse(each) for each in (*node.bases, *node.decorator_list)]
-            if any(kind.startswith(("NamedTuple", "dataclass")) for kind in kinds):
-                found[node.name] = sum(isinstance(each, ast.AnnAssign) for each in node.body)
-    return found
-
-
-def filled_by_stars(tree: ast.Module, fields: dict[str, int]) -> list[str]:
-    """Calls that make a large record out of starred arguments."""
-    calls = [node for node in ast.walk(tree) if is_starred(node)]
-    names = {
-        ast.unparse(call): ast.unparse(call.func).split(".")[-1] for call in calls if isinstance(call, ast.Call)
-    }
-    return [call for call, name in names.items() if fields.get(name, 0) > MOST_FIELDS]
-
-
-def test_a_record_filled_by_stars_is_seen() -> None:
-    small = "class Small(NamedTuple):\n    a: int\n"
-    large = "class Large(NamedTuple):\n    a: int\n    b: int\n    c: int\n    d: int\n"
-    tree = ast.parse(small + large)
-    fields = records([tree])
-    assert fields == {"Small": 1, "Large": 4}
-    assert filled_by_stars(ast.parse("Small(*a)\nLarge(a, *b)\nLarge(a=1, b=2, c=3, d=4)"), fields) == [
-        "Large(a, *b)"
-    ]
-
-
-def test_records_of_many_fields_are_filled_by_name() -> None:
-    trees = {str(path.relative_to(PACKAGE)): ast.parse(path.read_text()) for path in PACKAGE.rglob("*.py")}
-    fields = records([*trees.values()])
-    found = {name: calls for name, tree in trees.items() if (calls := filled_by_stars(tree, fields))}
-    assert len(fields) > 100
     assert not found

@@ -84,7 +84,8 @@ def test_every_file_beside_the_cases_reads() -> None:
 def test_without_dashpots_flutter_begins_least_where_both_directions_are_equally_stiff() -> None:
     sp = importlib.import_module("sympy")  # which has no types
     c1, c2, k, alpha = sp.symbols("c1 c2 K alpha", positive=True)
-    pull, apart = c2 * sp.sin(2 * alpha) / 2, c2 * sp.cos(2 * alpha) - c1 - k
+    pull = c2 * sp.sin(2 * alpha) / 2
+    apart = c2 * sp.cos(2 * alpha) - c1 - k
     phi = (pull + apart**2 / (4 * pull)) / k
     assert sp.simplify(phi.diff(c2).subs(c2, c1 + k)) == 0
     assert sp.simplify(phi.diff(c2, 2) * 2 * c2**3 * k * pull / c2 - (c1 + k) ** 2) == 0  # positive: a least value
@@ -143,7 +144,9 @@ def test_roughness_in_full_contact_does_not_move_the_critical_friction(damping: 
     # The waves leave a slope of the force along x that changes as a sine: stiffness that is modulated by at most
     # `swing`, which moves a growth rate by no more than swing/(2mω), times the condition of the modes.
     system = system_of(case("rough", settings))
-    c, wheel, phi = system.coefficients, system.wheel, smooth.value
+    c = system.coefficients
+    wheel = system.wheel
+    phi = smooth.value
     waves = TWO_PI * np.asarray(wheel.turns)
     slope = float(np.sum(np.abs(wheel.g * waves * np.sinc(waves * 0.05 / math.pi))))
     k = system.contact_stiffness
@@ -160,9 +163,12 @@ def test_roughness_in_full_contact_does_not_move_the_critical_friction(damping: 
 def test_one_dashpot_alone_leaves_a_mode_that_it_does_not_reach() -> None:
     draw = random.Random(12)
     for _ in range(20):
-        angle, c2, k = draw.uniform(1.0, 30.0), draw.uniform(0.5e7, 3e7), draw.uniform(2e5, 1e7)
+        angle = draw.uniform(1.0, 30.0)
+        c2 = draw.uniform(0.5e7, 3e7)
+        k = draw.uniform(2e5, 1e7)
         settings = {"link2.angle_deg": angle, "link2.stiffness": c2, "contact.stiffness": k / 0.1}
-        alpha, b = math.radians(angle), draw.uniform(10.0, 3000.0)
+        alpha = math.radians(angle)
+        b = draw.uniform(10.0, 3000.0)
         alone = [critical("flat", {**settings, "link1.damping": b1, "link2.damping": b - b1}) for b1 in (b, 0.0)]
         assert alone[0] == pytest.approx(c2 * math.sin(2.0 * alpha) / (2.0 * k), rel=1e-8)
         assert alone[1] == pytest.approx((1.0 + C1 / k) * math.tan(alpha), rel=1e-8)
@@ -173,11 +179,14 @@ def test_one_dashpot_alone_leaves_a_mode_that_it_does_not_reach() -> None:
 def test_equal_dashpots_at_right_angles_add_their_closed_form() -> None:
     draw = random.Random(3)
     for _ in range(20):
-        angle, c2, b = draw.uniform(1.0, 30.0), draw.uniform(1.05e7, 3e7), draw.uniform(0.0, 1000.0)
+        angle = draw.uniform(1.0, 30.0)
+        c2 = draw.uniform(1.05e7, 3e7)
+        b = draw.uniform(0.0, 1000.0)
         settings = {"link1.angle_deg": angle, "link2.angle_deg": angle, "link2.stiffness": c2}
         with_dashpots = {**settings, "link1.damping": b, "link2.damping": b}
         system = system_of(case("flat", with_dashpots))
-        c, k = system.coefficients, system.contact_stiffness
+        c = system.coefficients
+        k = system.contact_stiffness
         added = b**2 / c.m * 0.5 * (c.c_xx + c.c_yy + k) / (k * abs(c.c_xy))
         expected = critical("flat", {**settings, **NO_DASHPOTS}) + added
         assert critical("flat", with_dashpots) == pytest.approx(expected, rel=1e-8)
@@ -206,7 +215,8 @@ def determined(page: str) -> str:
 
     Their narrow windows of instability come and go with the last digits, which differ between processors.
     """
-    lines, column = [], 0
+    lines = []
+    column = 0
     for line in page.splitlines():
         cells = line.split("|")
         if "open, no dashpots, simulation" in line:

@@ -81,14 +81,16 @@ def outcomes_text(points: Sequence[Point]) -> str:
         [scheme.text, *(str(sum(point[3][scheme].kind == kind for point in points)) for kind in KINDS)]
         for scheme in SCHEMES
     ]
-    ranges, others = [], []
+    ranges = []
+    others = []
     for family in dict.fromkeys(point[0] for point in points):
         mine = [point for point in points if point[0] is family]
         cells = []
         for scheme in SCHEMES:
             right = [point[3][scheme].error for point in mine if point[3][scheme].kind == "right"]
             cells.append(f"{len(right)} of {len(mine)}, {max(right):.1e}" if right else f"0 of {len(mine)}")
-        low, high = min(family.values), max(family.values)
+        low = min(family.values)
+        high = max(family.values)
         ranges.append([family.name, f"{low:g} to {high:g}", family.unit, *cells])
         for scheme in SCHEMES:
             for kind in KINDS[1:]:

@@ -48,7 +48,8 @@ ROUGH: Tables = {  # its pad opens in part while it is pressed on
     "roughness": {"wheel": {"amplitudes": [10e-6], "wavelengths": [0.01]}},
 }
 
-TRUTH, EVENT_TOLERANCE = 1e-12, 1e-8
+TRUTH = 1e-12
+EVENT_TOLERANCE = 1e-8
 STEPS_PER_PERIOD = 2000
 PERIODS = 2.5
 SAMPLES = 200
@@ -137,7 +138,8 @@ class Pace:
 def pace(tables: Tables, omega_h: float | None = None, *, dashpots: bool = True) -> Pace:
     """The common pace, or a given ωh and at least 20 steps; `dashpots`: whether the step follows their rate."""
     system = system_of(case_of(tables, {"duration": 1.0, "step": 1.0}, 1.0))
-    c, k = system.coefficients, system.contact_stiffness
+    c = system.coefficients
+    k = system.contact_stiffness
     omega = 2.0 * math.pi * natural_frequencies(c, k)[1]
     rate = max(omega, float(np.abs(eigensystem(c, k, c.phi)[0]).max()))
     step = (omega_h or 2.0 * math.pi / STEPS_PER_PERIOD) / (rate if dashpots else omega)
@@ -172,8 +174,11 @@ def truth(tables: Tables, at: Pace) -> Truth:
 
 def exponential(system: System, rows: Rows) -> Rows | None:
     """The motion by the matrix exponential; None where it is not linear: it sticks, turns, opens or is rough."""
-    c, k, interval = system.coefficients, system.contact_stiffness, system.interval
-    states, force = rows[1:, list(HISTORY).index("state")], rows[1:, list(HISTORY).index("normal_force")]
+    c = system.coefficients
+    k = system.contact_stiffness
+    interval = system.interval
+    states = rows[1:, list(HISTORY).index("state")]
+    force = rows[1:, list(HISTORY).index("normal_force")]
     sliding = rows[:, 2] - system.belt_speed
     clear = np.abs(sliding).min() > 0.02 * np.abs(sliding).max()
     one_way = abs(states[0]) == 1.0 and (states == states[0]).all() and clear
@@ -244,7 +249,8 @@ def judge(tables: Tables, scheme: Scheme, at: Pace, reference: Truth, most: floa
                 work, rows = motion(system)
             else:
                 answer = certify(system)
-                work, rows = answer.motion.work, answer.motion.rows
+                work = answer.motion.work
+                rows = answer.motion.rows
                 if not answer.certificate.certified:
                     warnings.append(f"solver.tolerance: {answer.certificate.sentence()}")
             values, _ = eigensystem(system.coefficients, system.contact_stiffness, system.coefficients.phi)

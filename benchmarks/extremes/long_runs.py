@@ -43,7 +43,8 @@ LIMIT_CASES: dict[str, Tables] = {
     "no dashpots": changed(changed(STILL, "link1.damping", 0.0), "link2.damping", 0.0),
     "critical dashpots": changed(changed(STILL, "link1.damping", 2e4), "link2.damping", 2e4),
 }
-LIMIT_STEPS, MOST_LIMIT = 20_000, 1e3
+LIMIT_STEPS = 20_000
+MOST_LIMIT = 1e3
 
 
 def _still(tables: Tables, scheme: Scheme, step: float, steps: int, **initial: float) -> System:
@@ -84,7 +85,8 @@ def limits(tables: Tables, scheme: Scheme) -> tuple[float | None, float | None]:
     first = unstable.index(True)
     if first == 0:
         return predicted, 0.0
-    low, high = float(ladder[first - 1]), float(ladder[first])
+    low = float(ladder[first - 1])
+    high = float(ladder[first])
     while high > 1.0005 * low:
         middle = math.sqrt(low * high)
         low, high = (low, middle) if grows(tables, scheme, middle / at.omega) else (middle, high)
@@ -106,7 +108,8 @@ def drift(scheme: Scheme, steps_per_period: int, steps: int = DRIFT_STEPS) -> fl
     system = _still(tables, scheme, step, steps, x=0.5 * size, y=size)
     work, rows = motion(system)
     assert work.failure is Failure.NONE
-    c, k = system.coefficients, system.contact_stiffness
+    c = system.coefficients
+    k = system.contact_stiffness
     x, y = (rows[:, :2] - rest).T
     kinetic = 0.5 * c.m * (rows[:, 2] ** 2 + rows[:, 3] ** 2)
     energy = kinetic + 0.5 * (c.c_xx * x * x + 2.0 * c.c_xy * x * y + (c.c_yy + k) * y * y)

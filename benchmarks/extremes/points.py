@@ -107,7 +107,8 @@ def campaign(
     """Every point of every family by every scheme."""
     for family in families:
         for value in family.values:
-            tables, at = family.tables(value), family.pace(value)
+            tables = family.tables(value)
+            at = family.pace(value)
             reference = truth(tables, at)
             yield family, value, reference, {scheme: judge(tables, scheme, at, reference) for scheme in SCHEMES}
 

@@ -39,7 +39,9 @@ from brakecli.solver.system import System
 
 CASES = {"S": "smooth surfaces", "B": "rough surfaces, pad partly open", "C": "stick-slip"}
 DURATIONS = (0.02, 0.5)
-REFERENCE, LONG_REFERENCE = 1e-12, 1e-10  # tolerances, of 20 ms and of longer motions
+# tolerances, of 20 ms and of longer motions
+REFERENCE = 1e-12
+LONG_REFERENCE = 1e-10
 TURN_SECONDS = 3.0
 AGAINST_LSODA = {("S", 0.02): 5, ("B", 0.02): 3, ("C", 0.02): 5, ("S", 0.5): 12, ("B", 0.5): 3, ("C", 0.5): 10}
 AGAINST_SCIPY = {"S": 500, "B": 70, "C": 100}
@@ -186,7 +188,8 @@ def motion_goals(found: dict[tuple[str, float], list[Entry]], name: str) -> list
         both = [ratio(found["S", duration], "heyoka.py", target) or 0.0 for target in (1e-6, 1e-7)]
         what = f"heyoka.py: S at 1e-6 and 1e-7, {duration:g} s"
         goals.append((what, "≥ 2", ", ".join(map(number, both)), min(both) >= 2))
-    each, goal = ratio(found[name, DURATIONS[0]], "SciPy", 1e-3) or 0.0, AGAINST_SCIPY[name]
+    each = ratio(found[name, DURATIONS[0]], "SciPy", 1e-3) or 0.0
+    goal = AGAINST_SCIPY[name]
     what = f"SciPy: {name} at 1e-3, {DURATIONS[0]:g} s"
     goals.append((what, f"≥ {goal}", number(each), each >= goal))
     return goals
@@ -227,7 +230,8 @@ def certified(system: System) -> tuple[float, Floats]:
 def many(report: Report) -> None:
     """Case B at many coefficients of friction."""
     entries = report.ensemble
-    problem, found = ensembles.b_problem(ensembles.DURATION), report.rates
+    problem = ensembles.b_problem(ensembles.DURATION)
+    found = report.rates
     size = peers.scales(loop(replace(problem.system, method=rows.steps(256)))[1])
     for who, rate in {
         "numbalsoda LSODA": ensembles.numbalsoda,

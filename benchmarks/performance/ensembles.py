@@ -25,8 +25,11 @@ from brakecli.sweeps.point import compute
 
 CASES = Path(__file__).parents[2] / "cases"
 B = CASES / "accuracy" / "B.toml"
-DURATION, INTERVAL = 0.2, 2.5e-4
-LEAST, MOST = 0.2, 0.4  # friction
+DURATION = 0.2
+INTERVAL = 2.5e-4
+# friction
+LEAST = 0.2
+MOST = 0.4
 SECONDS = 2.0  # that a measurement should take
 
 
@@ -48,9 +51,11 @@ def rate(solve: Callable[[Floats], float | None], count: int = 2) -> tuple[float
     """Cases a second, and for each second of the processor, which `solve` may return."""
     solve(frictions(count))  # compiles
     while True:
-        begin, cpu = time.perf_counter(), time.process_time()
+        begin = time.perf_counter()
+        cpu = time.process_time()
         spent = solve(frictions(count))
-        seconds, used = time.perf_counter() - begin, time.process_time() - cpu
+        seconds = time.perf_counter() - begin
+        used = time.process_time() - cpu
         if seconds > 0.3 * SECONDS:
             return count / seconds, count / (spent or used)
         count *= max(2, math.ceil(SECONDS / max(seconds, 1e-3)))
@@ -60,10 +65,14 @@ def numbalsoda(problem: Problem, entry: Entry, size: Floats) -> Rate:
     """Threads over cases, each with the samples of its motion."""
     from numbalsoda import dop853, lsoda
 
-    name, tolerance = entry.settings["method"], entry.settings["tolerance"]
+    name = entry.settings["method"]
+    tolerance = entry.settings["tolerance"]
     solver = lsoda if name == "LSODA" else dop853
     function = peers.at_pointers(problem, entry.settings["nodes"], 0.0)
-    address, start, times, absolute = function.address, problem.start, problem.times, tolerance * size[:2].min()
+    address = function.address
+    start = problem.start
+    times = problem.times
+    absolute = tolerance * size[:2].min()
 
     @njit(parallel=True)
     def threads(phis):  # type: ignore[no-untyped-def]
@@ -110,13 +119,15 @@ def _solve(phi: float) -> float:
     from scipy.integrate import solve_ivp
 
     right, problem, options = _task
-    span, begin = (0.0, problem.times[-1]), time.process_time()
+    span = (0.0, problem.times[-1])
+    begin = time.process_time()
     solve_ivp(right, span, problem.start, t_eval=problem.times, args=(phi,), **options)
     return time.process_time() - begin
 
 
 def scipy(problem: Problem, entry: Entry, size: Floats) -> Rate:
-    tolerance, cores = entry.settings["tolerance"], os.cpu_count() or 1
+    tolerance = entry.settings["tolerance"]
+    cores = os.cpu_count() or 1
     options = {"method": entry.settings["method"], "rtol": tolerance, "atol": tolerance * size}
     arguments = (problem.system.duration, entry.settings["nodes"], options)
     with multiprocessing.get_context("spawn").Pool(cores, _prepare, arguments) as pool:

@@ -24,8 +24,13 @@ from brakecli.solver.system import System
 
 SOURCE = Path(__file__).with_name("step.c")
 FLAGS = ("-O3", "-march=native", "-ffast-math", "-shared", "-fPIC")
-NODES, COUNT, TURNS, PROCESSES = 256, 20_000, 15, 5
-X, Y, TRAVEL = 1e-5, -1e-4, 0.01
+NODES = 256
+COUNT = 20_000
+TURNS = 15
+PROCESSES = 5
+X = 1e-5
+Y = -1e-4
+TRAVEL = 0.01
 
 
 class Beside(NamedTuple):
@@ -50,7 +55,8 @@ def compiled(folder: str, waves: int) -> Any:
     sizes = (f"-DNODES={NODES}", f"-DWAVES={waves}")
     subprocess.run(["gcc", *FLAGS, *sizes, str(SOURCE), "-o", str(library), "-lm"], check=True)
     found = ctypes.CDLL(str(library))
-    found.evaluations.restype, found.steps.restype = ctypes.c_double, ctypes.c_long
+    found.evaluations.restype = ctypes.c_double
+    found.steps.restype = ctypes.c_long
     found.evaluations.argtypes = [ctypes.c_long] + [ctypes.c_double] * 3
     return found
 
@@ -92,7 +98,8 @@ def _measured(load: Callable[[], System]) -> list[Beside]:
     """An evaluation with 256 nodes, and a step in slip with as many evaluations as Newton's iteration takes."""
     method = Method("three-layer", NUMEROV, evaluator="midpoint", nodes=NODES, step=2.5e-5)
     system = replace(load(), method=method, interval=2.5e-5, duration=0.2)
-    pad, spacing = system.pad, 2.0 * system.half_length / NODES
+    pad = system.pad
+    spacing = 2.0 * system.half_length / NODES
     tiles = -(-(NODES + 2 * BESIDE) // TILE)
     waves = pad.tables[: 2 * len(system.wheel.g) * TILE * tiles].reshape(tiles, -1, 2, TILE)
     waves = (
@@ -100,7 +107,8 @@ def _measured(load: Callable[[], System]) -> list[Beside]:
     )
     parts = [np.pad(pad.tables[pad.constants.nodes_at :][:NODES], 1), *map(np.ascontiguousarray, waves)]
     omega = np.ascontiguousarray(system.wheel.omega)
-    layer, per_gap = build_layer(system.evaluate, pad), system.layer_stiffness * spacing
+    layer = build_layer(system.evaluate, pad)
+    per_gap = system.layer_stiffness * spacing
     with tempfile.TemporaryDirectory() as folder:
         library = compiled(folder, len(omega))
         library.tables(*(pointer(part) for part in (*parts, omega)))
@@ -119,11 +127,13 @@ def _measured(load: Callable[[], System]) -> list[Beside]:
 
 
 def _steps(system: System, library: Any, per_gap: float) -> Beside:
-    c, count = system.coefficients, system.steps
+    c = system.coefficients
+    count = system.steps
     load = system.load_at_start
     numbers = [*c[:7], load * c.sin_beta, load * c.cos_beta, c.phi, system.belt_speed, system.step, *NUMEROV]
     p = np.array([*numbers, per_gap, system.layer_stiffness])
-    state, evaluated = np.zeros(5), [0]
+    state = np.zeros(5)
+    evaluated = [0]
     begun = Stepping(system).plant.state
     start = np.array([begun.x_old, begun.y_old, begun.x, begun.y, begun.force])
     last: list[Any] = [None]
@@ -142,7 +152,8 @@ def _steps(system: System, library: Any, per_gap: float) -> Beside:
 
     times = []
     for _ in range(TURNS + 1):
-        own, begin = ours(), time.process_time()
+        own = ours()
+        begin = time.process_time()
         theirs()
         times.append((own, time.process_time() - begin))
     own, alone = (median(column) for column in zip(*times[1:], strict=True))

@@ -77,7 +77,8 @@ def measure(ladders: Iterable[Ladder], reference: Floats, seconds: float) -> lis
             if not rungs:
                 entry.compute()  # compiles
             spent, rows = entry.compute()
-            entry.seconds, entry.error = [spent], deviation(rows, reference)
+            entry.seconds = [spent]
+            entry.error = deviation(rows, reference)
             rungs.append(entry)
             flat = len(rungs) > 2 and 0.7 * rungs[-3].error < entry.error < 0.1
             if entry.error <= TARGETS[-1] or spent > SLOWEST or flat:
@@ -119,7 +120,8 @@ def cheapest(entries: list[Entry], who: str, target: float) -> Entry | None:
 
 def ratio(entries: list[Entry], who: str, target: float) -> float | None:
     """How many times longer a program takes than we do; None where one of the two does not reach the target."""
-    ours, theirs = cheapest(entries, US, target), cheapest(entries, who, target)
+    ours = cheapest(entries, US, target)
+    theirs = cheapest(entries, who, target)
     return theirs.time / ours.time if ours and theirs else None
 
 
@@ -131,8 +133,11 @@ def our_entry(system: System, method: Method, label: str) -> Entry:
 
 def loop(system: System) -> tuple[float, Floats]:
     """Seconds of the loop, and its samples; the last one is taken outside of it, as in `solve`."""
-    stepping, last, end = Stepping(system), np.zeros(len(HISTORY)), system.steps + system.scheme.LAG
-    seconds, parts = 0.0, list[Floats]()
+    stepping = Stepping(system)
+    last = np.zeros(len(HISTORY))
+    end = system.steps + system.scheme.LAG
+    seconds = 0.0
+    parts = list[Floats]()
     while not stepping.work.failed and stepping.counts.level < end:  # a long call returns now and then
         begin = time.process_time()
         parts.append(stepping.block(end))

@@ -11,7 +11,8 @@ from benchmarks.performance.matching import TARGETS, US, Entry, cheapest, names,
 from benchmarks.performance.rows import Table
 
 PAGE = Path(__file__).parents[2] / "docs" / "performance.md"
-BEGIN, END = "<!-- bench: written by `make bench` -->", "<!-- end of bench -->"
+BEGIN = "<!-- bench: written by `make bench` -->"
+END = "<!-- end of bench -->"
 PACKAGES = ("numbalsoda", "heyoka", "diffrax", "jax", "scikit-sundae", "scipy", "numba", "numpy")
 Goal = tuple[str, str, str, bool]
 """What, the goal, what was measured, whether it is reached."""

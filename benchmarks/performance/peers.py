@@ -92,7 +92,8 @@ def numbalsoda(problem: Problem, sticks: bool, reference: Floats) -> Iterator[La
     """LSODA, and DOP853 where friction is no stiff tanh; both are called from compiled code."""
     from numbalsoda import dop853, lsoda
 
-    size, data = scales(reference)[:2].min(), np.array([problem.phi])
+    size = scales(reference)[:2].min()
+    data = np.array([problem.phi])
 
     def call(solve: Any, function: Any, tolerance: float) -> Any:
         absolute = tolerance * size
@@ -128,8 +129,11 @@ def diffrax_vector(problem: Problem, nodes: int, width: float) -> Callable[[Any,
     """The right-hand side for JAX: f(t, u, phi)."""
     import jax.numpy as jnp
 
-    (m, b_xx, b_xy, b_yy, c_xx, c_xy, c_yy, sin_beta, cos_beta, _), belt = problem.c, problem.belt
-    load_x, load_y, stiffness = problem.load * sin_beta, problem.load * cos_beta, problem.stiffness
+    m, b_xx, b_xy, b_yy, c_xx, c_xy, c_yy, sin_beta, cos_beta, _ = problem.c
+    belt = problem.belt
+    load_x = problem.load * sin_beta
+    load_y = problem.load * cos_beta
+    stiffness = problem.stiffness
     tables = [jnp.asarray(table) for table in problem.tables(nodes)] if nodes else []
 
     def force(x: Any, y: Any, t: Any) -> Any:
@@ -142,7 +146,8 @@ def diffrax_vector(problem: Problem, nodes: int, width: float) -> Callable[[Any,
 
     def rhs(t: Any, u: Any, phi: Any) -> Any:
         x, y, v_x, v_y = u
-        normal, sliding = force(x, y, t), v_x - belt
+        normal = force(x, y, t)
+        sliding = v_x - belt
         side = jnp.tanh(sliding / width) if width > 0.0 else jnp.sign(sliding)
         a_x = (-phi * normal * side - b_xx * v_x - b_xy * v_y - c_xx * x - c_xy * y - load_x) / m
         a_y = (normal - b_yy * v_y - b_xy * v_x - c_yy * y - c_xy * x - load_y) / m
@@ -158,7 +163,8 @@ def diffrax_solver(problem: Problem, nodes: int, width: float, size: Floats) -> 
     import jax.numpy as jnp
 
     jax.config.update("jax_enable_x64", True)
-    term, scale = diffrax.ODETerm(diffrax_vector(problem, nodes, width)), jnp.asarray(size)
+    term = diffrax.ODETerm(diffrax_vector(problem, nodes, width))
+    scale = jnp.asarray(size)
 
     def solve(phi: Any, tolerance: Any) -> Any:
         return diffrax.diffeqsolve(
@@ -199,7 +205,8 @@ def scipy(problem: Problem, sticks: bool, reference: Floats) -> Iterator[Ladder]
     """solve_ivp; where the shoe sticks, DOP853 from event to event."""
     from scipy.integrate import solve_ivp
 
-    size, span = scales(reference), (0.0, problem.times[-1])
+    size = scales(reference)
+    span = (0.0, problem.times[-1])
 
     def call(right: Any, method: str, tolerance: float) -> Any:
         options = {"method": method, "rtol": tolerance, "atol": tolerance * size}
@@ -217,8 +224,11 @@ class StickSlip:
     """The motion by SciPy from one change between stick and slip to the next; all that it calls is compiled."""
 
     def __init__(self, problem: Problem, nodes: int) -> None:
-        force, (m, b_xx, b_xy, b_yy, c_xx, c_xy, c_yy, sin_beta, cos_beta, phi) = problem.force(nodes), problem.c
-        load_x, load_y, belt = problem.load * sin_beta, problem.load * cos_beta, problem.belt
+        force = problem.force(nodes)
+        m, b_xx, b_xy, b_yy, c_xx, c_xy, c_yy, sin_beta, cos_beta, phi = problem.c
+        load_x = problem.load * sin_beta
+        load_y = problem.load * cos_beta
+        belt = problem.belt
         self.problem = problem
 
         @njit
@@ -238,7 +248,9 @@ class StickSlip:
             """The sliding speed in slip; in stick, how far the force needed is within the friction cone."""
             return (u[2] - belt) * side if side != 0.0 else phi * force(u[0], u[1], t) - abs(needed(u))
 
-        self.rates, self.margin, self.needed = rates, margin, needed
+        self.rates = rates
+        self.margin = margin
+        self.needed = needed
 
     def solve(self, options: dict[str, Any]) -> Floats:
         from scipy.integrate import solve_ivp
@@ -246,16 +258,22 @@ class StickSlip:
         def ends(t: float, u: Any, side: float) -> float:
             return self.margin(t, u, side)  # type: ignore[no-any-return]
 
-        ends.terminal, ends.direction = True, -1.0  # type: ignore[attr-defined]
-        times, belt, parts = self.problem.times, self.problem.belt, list[Floats]()
-        t, u, side = 0.0, self.problem.start, -float(np.sign(belt))
+        ends.terminal = True  # type: ignore[attr-defined]
+        ends.direction = -1.0  # type: ignore[attr-defined]
+        times = self.problem.times
+        belt = self.problem.belt
+        parts = list[Floats]()
+        t = 0.0
+        u = self.problem.start
+        side = -float(np.sign(belt))
         while len(parts) < MOST_PARTS:
             due = times[np.searchsorted(times, t, "right" if parts else "left") :]
             part = solve_ivp(self.rates, (t, times[-1]), u, t_eval=due, events=ends, args=(side,), **options)
             parts.append(np.reshape(part.y, (4, -1)).T)  # a list where no sample is due
             if not part.t_events[0].size:
                 return np.concatenate(parts)
-            t, u = float(part.t_events[0][0]), part.y_events[0][0].copy()
+            t = float(part.t_events[0][0])
+            u = part.y_events[0][0].copy()
             if side:
                 u[2] = belt
             sticks = side != 0.0 and self.margin(t, u, 0.0) > 0.0

@@ -16,8 +16,10 @@ class Problem:
     """The numbers of a system whose speed and load are constant, in the paper's symbols, and its samples."""
 
     def __init__(self, system: System) -> None:
-        self.system, self.c = system, system.coefficients
-        self.load, self.belt = system.load_at_start, system.belt_speed
+        self.system = system
+        self.c = system.coefficients
+        self.load = system.load_at_start
+        self.belt = system.belt_speed
         self.stiffness = system.contact_stiffness
         self.times = system.interval * np.arange(system.samples + 1)
         self.start = np.array([system.initial.x, system.initial.y, system.initial.vx, system.initial.vy])
@@ -25,7 +27,8 @@ class Problem:
 
     def tables(self, nodes: int) -> tuple[Any, ...]:
         """Wavenumbers of the wheel, and at the nodes f1, g sin and g cos of the wheel: means over their cells."""
-        system, spacing = self.system, 2.0 * self.system.half_length / nodes
+        system = self.system
+        spacing = 2.0 * self.system.half_length / nodes
         xi = -system.half_length + spacing * (np.arange(nodes) + 0.5)
         shoe, wheel = (
             (f.omega, f.phase, f.g * np.sinc(f.omega * spacing / (2.0 * np.pi)))
@@ -50,12 +53,15 @@ class Problem:
 
             return smooth  # type: ignore[no-any-return]
         omega, f1, sines, cosines = self.tables(nodes)
-        belt, waves, per_node = self.belt, len(omega), stiffness / nodes
+        belt = self.belt
+        waves = len(omega)
+        per_node = stiffness / nodes
         zeros = (0.0,) * waves  # an array would be allocated in each call
 
         @njit(fastmath=FAST)
         def rough(x: float, y: float, t: float) -> float:
-            sine, cosine = zeros, zeros
+            sine = zeros
+            cosine = zeros
             for i in range(waves):
                 angle = omega[i] * (x - belt * t)
                 sine = tuple_setitem(sine, i, np.sin(angle))
@@ -72,15 +78,23 @@ class Problem:
 
     def right_hand_side(self, nodes: int, width: float = 0.0) -> Callable[..., None]:
         """rhs(t, u, du, phi), compiled: (6)-(7), friction by the sign of the speed or by tanh over a width."""
-        force, (m, b_xx, b_xy, b_yy, c_xx, c_xy, c_yy, sin_beta, cos_beta, _) = self.force(nodes), self.c
-        load_x, load_y, belt = self.load * sin_beta, self.load * cos_beta, self.belt
+        force = self.force(nodes)
+        m, b_xx, b_xy, b_yy, c_xx, c_xy, c_yy, sin_beta, cos_beta, _ = self.c
+        load_x = self.load * sin_beta
+        load_y = self.load * cos_beta
+        belt = self.belt
 
         @njit
         def rhs(t: float, u: Any, du: Any, phi: float) -> None:
-            x, y, v_x, v_y = u[0], u[1], u[2], u[3]
-            normal, sliding = force(x, y, t), v_x - belt
+            x = u[0]
+            y = u[1]
+            v_x = u[2]
+            v_y = u[3]
+            normal = force(x, y, t)
+            sliding = v_x - belt
             side = np.tanh(sliding / width) if width > 0.0 else np.sign(sliding)
-            du[0], du[1] = v_x, v_y
+            du[0] = v_x
+            du[1] = v_y
             du[2] = (-phi * normal * side - b_xx * v_x - b_xy * v_y - c_xx * x - c_xy * y - load_x) / m
             du[3] = (normal - b_yy * v_y - b_xy * v_x - c_yy * y - c_xy * x - load_y) / m
 

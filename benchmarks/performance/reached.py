@@ -28,7 +28,8 @@ def side_by_side(case: str, entries: list[Entry]) -> dict[str, float]:
 
 def fallen(old: Ratios, new: Ratios, *, whole: bool = True) -> list[str]:
     """Each ratio that fell too far; in a `whole` run also those that are not there any more."""
-    measured, programs = {*map(_program, new)}, Counter(map(_program, old))
+    measured = {*map(_program, new)}
+    programs = Counter(map(_program, old))
     absent = {who: count for who, count in programs.items() if who not in measured}
     lost = [f"{who}: none of {count} ratios was measured; install it" for who, count in absent.items()]
     lost += [

@@ -25,7 +25,8 @@ from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
 from brakecli.sweeps.point import compute
 
-CASES, RELAXATION = ensembles.CASES, ensembles.CASES / "relaxation.toml"
+CASES = ensembles.CASES
+RELAXATION = ensembles.CASES / "relaxation.toml"
 REGIMES = "solver={tolerance=1e-3, duration=2.0}"
 PROBE = 100  # points along each axis: of 20, the one beside the critical friction counts for too much
 # B's waves with a common length of 2.6 m, which passes in 1 s, on a suspension that loses stability
@@ -51,10 +52,12 @@ def loop_seconds(system: System, method: Method, turns: int = 5) -> float:
 def promise(duration: float, entries: list[Entry], turns: int = 9) -> tuple[float, float]:
     """Seconds of a certified run of B to 1e-3, and of the cheapest entry that keeps it: medians, as of entries."""
     settings = (f"solver={{duration={duration}, tolerance=1e-3}}", f"output.sample_interval={ensembles.INTERVAL}")
-    best, seconds = cheapest(entries, "brakecli", 1e-3), list[float]()
+    best = cheapest(entries, "brakecli", 1e-3)
+    seconds = list[float]()
     assert best is not None
     for _ in range(turns):
-        system, begin = load("accuracy/B.toml", *settings), time.process_time()
+        system = load("accuracy/B.toml", *settings)
+        begin = time.process_time()
         certify(system)
         seconds.append(time.process_time() - begin)
     return median(seconds[1:]), best.time
@@ -71,16 +74,19 @@ def map_seconds(points: int) -> tuple[float, float]:
         )
         path.write_text(f'case = "{RELAXATION}"\n{text}')
         command = [sys.executable, "-m", "brakecli", "sweep", str(path), "--set", REGIMES, "--quiet"]
-        begin, before = time.perf_counter(), os.times()
+        begin = time.perf_counter()
+        before = os.times()
         subprocess.run([*command, "-o", str(Path(name) / "map.h5")], check=True, stdout=subprocess.DEVNULL)
-        seconds, after = time.perf_counter() - begin, os.times()
+        seconds = time.perf_counter() - begin
+        after = os.times()
     used = after.children_user + after.children_system - before.children_user - before.children_system
     return seconds, used
 
 
 def regimes_map(points: int) -> tuple[float, str]:
     """Seconds of the map, and how they were found: those of a larger one follow from that of `PROBE` x `PROBE`."""
-    (start, start_used), (seconds, used) = map_seconds(2), map_seconds(PROBE)
+    start, start_used = map_seconds(2)
+    seconds, used = map_seconds(PROBE)
     told = f"{1e3 * (used - start_used) / PROBE**2:.3g} ms of a core a point, start and end {start:.2g} s"
     if points == PROBE:
         return seconds, told
@@ -110,7 +116,8 @@ Table = tuple[str, list[str], list[list[str]]]
 
 
 def by_duration() -> Table:
-    durations, rows = (0.02, 0.1, 0.5, 2.0), []
+    durations = (0.02, 0.1, 0.5, 2.0)
+    rows = []
     for name, method in (("S", Method("piecewise-exact")), ("B", steps(256)), ("C", steps(256))):
         system = replace(load(f"accuracy/{name}.toml"), interval=2.5e-4)
         times = [loop_seconds(replace(system, duration=each), method) for each in durations]
@@ -125,18 +132,22 @@ def _row(over: Iterable[int], what: Callable[[int], tuple[System, Method]]) -> l
 
 
 def by_nodes() -> Table:
-    counts, system = (64, 256, 1024, 4096), replace(load("accuracy/B.toml"), interval=2.5e-4)
+    counts = (64, 256, 1024, 4096)
+    system = replace(load("accuracy/B.toml"), interval=2.5e-4)
     row = _row(counts, lambda nodes: (system, steps(nodes)))
     return "A step of B by nodes, five waves on the wheel", [f"{each} nodes" for each in counts], [row]
 
 
 def by_waves() -> Table:
     """Over 0.1 s at a load under which the pad is open in part at each step: closed forms know few waves only."""
-    counts, rows, b = (5, 50, 500), [], load("accuracy/B.toml", "load.force=1000.0")
+    counts = (5, 50, 500)
+    rows = []
+    b = load("accuracy/B.toml", "load.force=1000.0")
 
     def rough(waves: int) -> System:
         wave = np.arange(waves)
-        amplitudes, lengths = 7.2e-5 / waves * np.ones(waves), 0.025 / (1.0 + 5.0 * wave / waves)
+        amplitudes = 7.2e-5 / waves * np.ones(waves)
+        lengths = 0.025 / (1.0 + 5.0 * wave / waves)
         wheel = surface(amplitudes=tuple(amplitudes), wavelengths=tuple(lengths))
         return replace(b, interval=2.5e-4, duration=0.1, wheel=wheel)
 
@@ -154,7 +165,8 @@ def by_waves() -> Table:
 
 
 def by_points() -> Table:
-    counts, rows = (40, 160, 640), []
+    counts = (40, 160, 640)
+    rows = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for workers in (1, 2):

@@ -29,7 +29,8 @@ def bouncing(problem: Problem, tolerance: float) -> Callable[[], Floats]:
     """A motion that always slips backward, and may leave the wheel: an event for each change of contact."""
     import heyoka as hy
 
-    touches, phi = hy.par[0], problem.phi
+    touches = hy.par[0]
+    phi = problem.phi
     u, rates, _ = equations(problem, lambda y: -problem.stiffness * touches * y, lambda normal: phi * normal)
 
     def switch(motion: Any, direction: int) -> bool:
@@ -42,7 +43,9 @@ def bouncing(problem: Problem, tolerance: float) -> Callable[[], Floats]:
     motion = hy.taylor_adaptive(rates, problem.start, tol=tolerance, t_events=[event], pars=[1.0])
 
     def solve() -> Floats:
-        motion.time, motion.state[:], motion.pars[0] = 0.0, start, 1.0
+        motion.time = 0.0
+        motion.state[:] = start
+        motion.pars[0] = 1.0
         motion.reset_cooldowns()
         return motion.propagate_grid(problem.times)[-1]  # type: ignore[no-any-return]
 
@@ -56,7 +59,9 @@ def stick_slip(problem: Problem, tolerance: float) -> Callable[[], Floats]:
     def normal(y: Any) -> Any:
         return -problem.stiffness * y
 
-    phi, belt, end = problem.phi, problem.belt, problem.times[-1]
+    phi = problem.phi
+    belt = problem.belt
+    end = problem.times[-1]
     u, rates, _ = equations(problem, normal, lambda force: phi * force)
     slip = hy.taylor_adaptive(rates, problem.start, tol=tolerance, t_events=[hy.t_event(u[2] - belt)])
     u, rates, needed = equations(problem, normal, None)
@@ -66,15 +71,20 @@ def stick_slip(problem: Problem, tolerance: float) -> Callable[[], Floats]:
 
     def solve() -> Floats:
         rows = np.empty((len(problem.times), 4))
-        motion, motion.time, motion.state[:], row = slip, 0.0, problem.start, 0
+        motion = slip
+        motion.time = 0.0
+        motion.state[:] = problem.start
+        row = 0
         slip.reset_cooldowns()
         while row < len(rows):
-            due, outcome = problem.times[row], 0
+            due = problem.times[row]
+            outcome = 0
             if due > motion.time:
                 outcome = int(motion.propagate_until(due)[0].value)
             if outcome == event:
                 other = stick if motion is slip else slip
-                other.time, other.state[:] = motion.time, motion.state
+                other.time = motion.time
+                other.state[:] = motion.state
                 other.state[2] = belt if other is stick else belt - PUSH
                 other.reset_cooldowns()
                 motion = other

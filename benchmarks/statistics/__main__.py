@@ -13,7 +13,8 @@ from benchmarks.statistics.cases import KINDS
 from benchmarks.statistics.judging import Judged, judged
 from benchmarks.statistics.page import PAGE, by_tolerance, page
 
-RUNS, SEED = 4000, 1
+RUNS = 4000
+SEED = 1
 
 
 def main() -> None:
@@ -34,7 +35,9 @@ def main() -> None:
     kinds = [given.only] if given.only else KINDS
     task = partial(judged, lanes=given.lanes)
     work = [(kinds[n % len(kinds)], given.seed, n // len(kinds)) for n in range(given.runs)]
-    found, unknown, begin = list[Judged](), 0, time.perf_counter()
+    found = list[Judged]()
+    unknown = 0
+    begin = time.perf_counter()
     task((KINDS[3], given.seed, 0))  # kernels are compiled here: workers on a cold cache would each do it
     with multiprocessing.get_context("spawn").Pool(given.workers) as pool:
         for number, one in enumerate(pool.imap_unordered(task, work), 1):

@@ -23,7 +23,9 @@ KINDS = (
 )
 PER_PERIOD = 20.0  # samples per period of the fastest natural motion, about
 MOST_TRIES = 400
-LOOSEST, TIGHTEST = -2.0, -10.0  # powers of ten of tolerances
+# powers of ten of tolerances
+LOOSEST = -2.0
+TIGHTEST = -10.0
 
 
 @dataclass(frozen=True)
@@ -83,11 +85,13 @@ def _flat(
     rng: np.random.Generator, speed: tuple[float, float], friction: tuple[float, float] = (0.1, 1.0)
 ) -> Tables:
     """A smooth case; the speed of the wheel's surface (powers of ten, m/s) and the friction lie between bounds."""
-    mass, c_1 = 10.0 ** rng.uniform(-0.5, 1.5), 10.0 ** rng.uniform(6.0, 7.5)
+    mass = 10.0 ** rng.uniform(-0.5, 1.5)
+    c_1 = 10.0 ** rng.uniform(6.0, 7.5)
     whole = c_1 * 10.0 ** rng.uniform(-1.0, 0.7)
     c_2 = (c_1 + whole) * 10.0 ** rng.uniform(-0.4, 0.3)
     damping = 10.0 ** rng.uniform(-3.0, -1.3) * math.sqrt(mass) if rng.uniform() < 0.85 else 0.0
-    a, load = 0.05 * 10.0 ** rng.uniform(-0.5, 0.3), 10.0 ** rng.uniform(2.0, 3.7)
+    a = 0.05 * 10.0 ** rng.uniform(-0.5, 0.3)
+    load = 10.0 ** rng.uniform(2.0, 3.7)
     return {
         "shoe": {"mass": mass},
         "wheel": {"radius": 0.5, "angular_speed": 2.0 * 10.0 ** rng.uniform(*speed)},
@@ -115,7 +119,8 @@ def _timed(tables: Tables, rng: np.random.Generator, least: float, most: float) 
 
 def _compression(tables: Tables) -> float:
     """Of the layer under the load, m, with a stiff suspension taking its part."""
-    shoe, load = shoe_of(tables), tables["load"]
+    shoe = shoe_of(tables)
+    load = tables["load"]
     force = load["force"] if "force" in load else float(np.mean(load["forces"]))
     return float(abs(force) / (shoe.c_yy + 2.0 * shoe.a * shoe.k))
 
@@ -139,7 +144,8 @@ def _rough(tables: Tables, rng: np.random.Generator, low: float, high: float) ->
 def _settled(tables: Tables, rng: np.random.Generator, away: float) -> Tables:
     """With a start beside steady sliding in full contact, by up to a part of the compression."""
     shoe = shoe_of(tables)
-    K, Q = 2.0 * shoe.a * shoe.k, tables["load"].get("force", 0.0)
+    K = 2.0 * shoe.a * shoe.k
+    Q = tables["load"].get("force", 0.0)
     # The wheel moves faster than the shoe: F_x = φ F_y. The surface of the shoe adds a constant to the force.
     own = shoe.k * shoe.area_1
     x, y = np.linalg.solve(
@@ -200,7 +206,8 @@ def _any_surface(tables: Tables, rng: np.random.Generator) -> Tables:
 
 def _reversing(rng: np.random.Generator) -> Tables:
     tables = _any_surface(_flat(rng, (-1.5, 0.3)), rng)
-    duration, knots = tables["solver"]["duration"], int(rng.integers(2, 6))
+    duration = tables["solver"]["duration"]
+    knots = int(rng.integers(2, 6))
     speed = tables["wheel"].pop("angular_speed")
     times = np.sort(rng.uniform(0.0, duration, knots))
     signs = np.where(np.arange(knots) % 2, -1.0, 1.0) * rng.choice([-1.0, 1.0])
@@ -213,8 +220,11 @@ def _reversing(rng: np.random.Generator) -> Tables:
 
 def _load_steps(rng: np.random.Generator) -> Tables:
     tables = _any_surface(_flat(rng, (-1.5, 0.3)), rng)
-    duration, period = tables["solver"]["duration"], tables["output"]["sample_interval"] * PER_PERIOD
-    force, times, forces = tables["load"].pop("force"), [0.0], [1.0]
+    duration = tables["solver"]["duration"]
+    period = tables["output"]["sample_interval"] * PER_PERIOD
+    force = tables["load"].pop("force")
+    times = [0.0]
+    forces = [1.0]
     for begin in np.sort(rng.uniform(0.05, 0.95, int(rng.integers(1, 4)))) * duration:
         if begin <= times[-1]:
             continue
@@ -228,7 +238,8 @@ def _load_steps(rng: np.random.Generator) -> Tables:
 def _amplifying(rng: np.random.Generator) -> Tables:
     """Self-excited, for long: growth, then stick, slip and lift-off, some of it chaotic."""
     tables = _flat(rng, (-2.0, 0.3), (0.5, 1.2))
-    tables["link1"]["angle_deg"], tables["link2"]["angle_deg"] = rng.uniform(-10.0, 40.0), rng.uniform(0.0, 40.0)
+    tables["link1"]["angle_deg"] = rng.uniform(-10.0, 40.0)
+    tables["link2"]["angle_deg"] = rng.uniform(0.0, 40.0)
     if rng.uniform() < 0.3:
         return _timed(_rough(tables, rng, -0.5, 0.3), rng, 3.0, 6.0)
     return _timed(_settled(tables, rng, 10.0 ** rng.uniform(-6.0, 0.0)), rng, 40.0, 250.0)

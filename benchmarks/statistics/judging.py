@@ -77,7 +77,8 @@ def judge(drawn: Drawn, share: float = SHARE, *, lanes: bool = False) -> Judged 
     if exact is None:
         return None
     run = found or certify(system)
-    said, rows = run.certificate, np.asarray(run.motion.rows[:, :4])
+    said = run.certificate
+    rows = np.asarray(run.motion.rows[:, :4])
     good = exact.good(drawn.tolerance / BETTER)
     kept = min(good, 1 + math.floor(said.certified_until / exact.interval + 1e-6))
     return Judged(

@@ -30,7 +30,8 @@ def inner(function: F) -> F:
 
 
 Three = tuple[float, float, float]
-SLIP, STICK = 0, 1
+SLIP = 0
+STICK = 1
 STAGES = 12
 # Coefficients of Dormand and Prince, order 8, as SciPy publishes them; its stepper is not used.
 A, B, C = (np.ascontiguousarray(each, dtype=float) for each in (DOP853.A[:STAGES, :STAGES], DOP853.B, DOP853.C))
@@ -105,7 +106,8 @@ class Work(NamedTuple):
 @inner
 def gap(shoe: Shoe, theta: Floats, xi: float) -> tuple[float, float]:
     """f_2 - f_1 at a place of the pad, and its slope; theta are the phases of the wheel at its centre."""
-    height, slope = 0.0, 0.0
+    height = 0.0
+    slope = 0.0
     for i in range(len(shoe.g_2)):
         angle = shoe.q_2[i] * xi + theta[i]
         height += shoe.g_2[i] * math.sin(angle)
@@ -120,7 +122,8 @@ def gap(shoe: Shoe, theta: Floats, xi: float) -> tuple[float, float]:
 @inner
 def area(shoe: Shoe, theta: Floats, y: float, left: float, right: float) -> float:
     """The integral of f_2 - f_1 - y, m²; differences of cosines as products, so that nothing cancels."""
-    middle, half = 0.5 * (left + right), 0.5 * (right - left)
+    middle = 0.5 * (left + right)
+    half = 0.5 * (right - left)
     total = -2.0 * y * half
     for i in range(len(shoe.g_2)):
         q = shoe.q_2[i]
@@ -164,27 +167,35 @@ def contact(shoe: Shoe, theta: Floats, y: float) -> tuple[float, float]:
         return 0.0, 0.0
     if y <= -shoe.height:
         return shoe.k * area(shoe, theta, y, -shoe.a, shoe.a), 2.0 * shoe.a
-    bent, total, length = shoe.curvature, 0.0, 0.0
-    lefts, rights, lows, highs = (
-        np.empty(MOST_PARTS),
-        np.empty(MOST_PARTS),
-        np.empty(MOST_PARTS),
-        np.empty(MOST_PARTS),
-    )
-    turn_s, turn_c = np.sin(theta), np.cos(theta)
+    bent = shoe.curvature
+    total = 0.0
+    length = 0.0
+    lefts = np.empty(MOST_PARTS)
+    rights = np.empty(MOST_PARTS)
+    lows = np.empty(MOST_PARTS)
+    highs = np.empty(MOST_PARTS)
+    turn_s = np.sin(theta)
+    turn_c = np.cos(theta)
     at = 0.0
     for j in range(len(shoe.edges)):
-        before, at = at, -shoe.f_1[j] - y
+        before = at
+        at = -shoe.f_1[j] - y
         for i in range(len(shoe.g_2)):
             at += shoe.g_2[i] * (shoe.sines[i, j] * turn_c[i] + shoe.cosines[i, j] * turn_s[i])
         if j == 0:
             begun = -shoe.a if at > 0.0 else math.nan
             continue
         count = 1
-        lefts[0], rights[0], lows[0], highs[0] = shoe.edges[j - 1], shoe.edges[j], before, at
+        lefts[0] = shoe.edges[j - 1]
+        rights[0] = shoe.edges[j]
+        lows[0] = before
+        highs[0] = at
         while count > 0:
             count -= 1
-            left, right, low, high = lefts[count], rights[count], lows[count], highs[count]
+            left = lefts[count]
+            right = rights[count]
+            low = lows[count]
+            high = highs[count]
             width = right - left
             same = (low > 0.0) == (high > 0.0)
             if same and min(abs(low), abs(high)) > 0.125 * bent * width * width:
@@ -203,8 +214,14 @@ def contact(shoe: Shoe, theta: Floats, y: float) -> tuple[float, float]:
                     length += place - begun
                 continue
             height -= y  # the left half lies on top, so that roots are found from left to right
-            lefts[count], rights[count], lows[count], highs[count] = middle, right, height, high
-            lefts[count + 1], rights[count + 1], lows[count + 1], highs[count + 1] = left, middle, low, height
+            lefts[count] = middle
+            rights[count] = right
+            lows[count] = height
+            highs[count] = high
+            lefts[count + 1] = left
+            rights[count + 1] = middle
+            lows[count + 1] = low
+            highs[count + 1] = height
             count += 2
     if at > 0.0:
         total += area(shoe, theta, y, begun, shoe.a)
@@ -235,7 +252,8 @@ def rates(shoe: Shoe, span: Span, t: float, z: Floats, phase: Phase, out: Floats
     x, y, vx, vy = z
     F_y, length = normal(shoe, span, t, x, y, phase.pressed)
     Q = span.Q + span.Q_t * t
-    out[0], out[1] = vx, vy
+    out[0] = vx
+    out[1] = vy
     if phase.mode == STICK:
         out[2] = span.U_t
     else:
@@ -249,7 +267,8 @@ def rates(shoe: Shoe, span: Span, t: float, z: Floats, phase: Phase, out: Floats
 @inner
 def step(shoe: Shoe, span: Span, t: float, h: float, phase: Phase, work: Work) -> float:
     """A step of order 8 from z + rest, where k[0] are the rates, to `new`; returns its error over the scale."""
-    k, stage = work.k, np.empty(4)
+    k = work.k
+    stage = np.empty(4)
     for s in range(1, STAGES):
         for i in range(4):
             total = 0.0
@@ -257,9 +276,12 @@ def step(shoe: Shoe, span: Span, t: float, h: float, phase: Phase, work: Work) -
                 total += A[s, r] * k[r, i]
             stage[i] = work.z[i] + (work.rest[i] + h * total)
         rates(shoe, span, t + C[s] * h, stage, phase, k[s])
-    fifth, third = 0.0, 0.0
+    fifth = 0.0
+    third = 0.0
     for i in range(4):
-        total, five, three = 0.0, 0.0, 0.0
+        total = 0.0
+        five = 0.0
+        three = 0.0
         for s in range(STAGES):
             total += B[s] * k[s, i]
             five += E5[s] * k[s, i]
@@ -270,7 +292,8 @@ def step(shoe: Shoe, span: Span, t: float, h: float, phase: Phase, work: Work) -
         fifth += (five / work.scale[i]) ** 2
         third += (three / work.scale[i]) ** 2
     if phase.mode == STICK:
-        work.new[2], work.new_rest[2] = span.U + span.U_t * (t + h), 0.0
+        work.new[2] = span.U + span.U_t * (t + h)
+        work.new_rest[2] = 0.0
     if fifth == 0.0:
         return 0.0
     return abs(h) * fifth / math.sqrt(4.0 * (fifth + 0.01 * third))
@@ -285,7 +308,12 @@ def ends(
     In slip this is the sliding speed, in stick the room on both sides of the cone of friction, on smooth surfaces
     the height, positive on the side where the pad is. What does not apply is 1.
     """
-    one, d_one, two, d_two, three, d_three = 1.0, 0.0, 1.0, 0.0, 1.0, 0.0
+    one = 1.0
+    d_one = 0.0
+    two = 1.0
+    d_two = 0.0
+    three = 1.0
+    d_three = 0.0
     if phase.mode == SLIP and shoe.phi > 0.0:
         one = phase.sign * (z[2] - (span.U + span.U_t * t))
         d_one = phase.sign * (rate[2] - span.U_t)
@@ -294,8 +322,10 @@ def ends(
         grown = shoe.b_xx * span.U_t + shoe.c_xx * z[2] + shoe.b_xy * rate[3] + shoe.c_xy * z[3]
         grown += span.Q_t * shoe.sin_beta
         pull = -shoe.phi * shoe.k * length * z[3]  # a stuck shoe moves with the wheel: only y changes the force
-        one, d_one = shoe.phi * F_y - force, pull - grown
-        two, d_two = shoe.phi * F_y + force, pull + grown
+        one = shoe.phi * F_y - force
+        d_one = pull - grown
+        two = shoe.phi * F_y + force
+        d_two = pull + grown
     if shoe.height == 0.0:
         three, d_three = (-z[1], -z[3]) if phase.pressed else (z[1], z[3])
     return (one, two, three), (d_one, d_two, d_three)
@@ -324,7 +354,8 @@ def lowest(v_0: float, s_0: float, v_1: float, s_1: float, h: float) -> float:
 @inner
 def dip(shoe: Shoe, span: Span, t: float, h: float, phase: Phase, work: Work, e: int, fall: float) -> float:
     """Where within a step of h the e-th of what ends a phase is negative, though not behind it; -1 if nowhere."""
-    low, high = 0.0, h
+    low = 0.0
+    high = h
     for _ in range(60):
         at = 0.5 * (low + high)
         values, slopes = look(shoe, span, t, at, phase, work)
@@ -345,19 +376,28 @@ def zero(shoe: Shoe, span: Span, t: float, h: float, phase: Phase, work: Work, e
 
     It may be zero at the start of the step, where a phase has just begun.
     """
-    low, high, at = 0.0, h, 0.0
-    v_low, v_high, side = 0.0, 0.0, 0
+    low = 0.0
+    high = h
+    at = 0.0
+    v_low = 0.0
+    v_high = 0.0
+    side = 0
     for turn in range(200):
-        before, at = at, 0.5 * (low + high)
+        before = at
+        at = 0.5 * (low + high)
         if turn % 4 < 3 and v_low > 0.0 > v_high:
             at = low + (high - low) * v_low / (v_low - v_high)
         value = look(shoe, span, t, at, phase, work)[0][e]
         if value < 0.0:
-            high, v_high = at, value
-            v_low, side = (0.5 * v_low if side < 0 else v_low), -1
+            high = at
+            v_high = value
+            v_low = 0.5 * v_low if side < 0 else v_low
+            side = -1
         else:
-            low, v_low = at, value
-            v_high, side = (0.5 * v_high if side > 0 else v_high), 1
+            low = at
+            v_low = value
+            v_high = 0.5 * v_high if side > 0 else v_high
+            side = 1
         if value == 0.0 < at or high - low <= least or (abs(at - before) <= least and v_low > 0.0 > v_high):
             break
     return at
@@ -390,7 +430,10 @@ def integrate(
     number of sticks, of turns of friction without stick, of lifts (rough: steps without touch), of steps with an
     open pad, and of steps. Returns whether it succeeded.
     """
-    z, rest, h, acceleration = work.z, work.rest, 1e-3 * longest, math.nan
+    z = work.z
+    rest = work.rest
+    h = 1e-3 * longest
+    acceleration = math.nan
     pressed = z[1] < 0.0 or (z[1] == 0.0 and (z[3] < 0.0 or (z[3] == 0.0 and spans[0, 3] * shoe.cos_beta > 0.0)))
     phase = Phase(SLIP, (1.0 if z[2] > spans[0, 1] else -1.0), pressed)
     if z[2] == spans[0, 1]:
@@ -399,9 +442,11 @@ def integrate(
         counts[0] += phase.mode == STICK
     for number in range(len(spans)):
         one = spans[number]
-        span, t = Span(one[0], one[1], one[2], one[3], one[4], phases[number]), 0.0
+        span = Span(one[0], one[1], one[2], one[3], one[4], phases[number])
+        t = 0.0
         if phase.mode == STICK and span.U_t != acceleration:  # at a knot the wheel's acceleration jumps
-            z[2], rest[2] = span.U, 0.0
+            z[2] = span.U
+            rest[2] = 0.0
             phase = begin(shoe, span, t, z, phase, work.rate)
             h = 1e-3 * longest
         acceleration = span.U_t
@@ -422,9 +467,11 @@ def integrate(
             counts[2] += shoe.height > 0.0 and length == 0.0
             counts[3] += 0.0 < length < 2.0 * shoe.a * (1.0 - 1e-12)
             after, risen = look(shoe, span, t, taking, phase, work)
-            first, which = taking, -1
+            first = taking
+            which = -1
             for e in range(3):
-                upper, fall = -1.0, taking * (abs(slopes[e]) + abs(risen[e]))
+                upper = -1.0
+                fall = taking * (abs(slopes[e]) + abs(risen[e]))
                 if after[e] < 0.0:
                     upper = taking
                 elif slopes[e] < 0.0 < risen[e]:
@@ -434,11 +481,14 @@ def integrate(
                 if upper > 0.0:
                     place = zero(shoe, span, t, upper, phase, work, e, 1e-16 * longest)
                     if place <= first:
-                        first, which = place, e
+                        first = place
+                        which = e
             if which >= 0:
-                taking, last = first, False
+                taking = first
+                last = False
             step(shoe, span, t, taking, phase, work)  # again: looking for events has used its place
-            z[:], rest[:] = work.new, work.new_rest
+            z[:] = work.new
+            rest[:] = work.new_rest
             t = span.length if last else t + taking
             if which < 0:
                 grown = taking * min(5.0, 0.9 * max(error, 1e-12) ** -0.125)
@@ -447,10 +497,12 @@ def integrate(
             h = 1e-3 * longest
             if which == 2:
                 phase = Phase(phase.mode, phase.sign, not phase.pressed)
-                z[1], rest[1] = 0.0, 0.0
+                z[1] = 0.0
+                rest[1] = 0.0
                 counts[2] += not phase.pressed
             elif phase.mode == SLIP:
-                z[2], rest[2] = span.U + span.U_t * t, 0.0
+                z[2] = span.U + span.U_t * t
+                rest[2] = 0.0
                 phase = begin(shoe, span, t, z, phase, work.rate)
                 counts[0] += phase.mode == STICK
                 counts[1] += phase.mode == SLIP

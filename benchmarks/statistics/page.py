@@ -76,8 +76,10 @@ def _method(each: Judged) -> str:
 
 def _summary(found: Sequence[Judged], unknown: int) -> str:
     """The result in a few sentences."""
-    broken, low = (sum(each.broken or each.broken_early for each in found), sum(each.low for each in found))
-    sure, part = sum(each.certified for each in found), sum(each.compared < 1.0 for each in found)
+    broken = sum(each.broken or each.broken_early for each in found)
+    low = sum(each.low for each in found)
+    sure = sum(each.certified for each in found)
+    part = sum(each.compared < 1.0 for each in found)
     hidden = sum(each.error <= each.own for each in found)
     words = [
         f"Of {len(found)} runs {sure} are certified. Broken promises: **{broken}**. Low estimates: **{low}**.",
@@ -123,7 +125,8 @@ def _histogram(found: Sequence[Judged]) -> str:
     lines = ["| estimate / error | runs | of these at least | |", "|---|---|---|---|"]
     for n in range(min({*seen, *unseen}), max({*seen, *unseen}) + 1):
         bar = "█" * math.ceil(BAR * (seen[n] + unseen[n]) / most)
-        low, high = 10.0 ** (n / 2.0), 10.0 ** ((n + 1) / 2.0)
+        low = 10.0 ** (n / 2.0)
+        high = 10.0 ** ((n + 1) / 2.0)
         ratio = f"{low:.2g} to {high:.2g}" if n < MOST else f"{low:.2g} and more"
         lines.append(f"| {ratio} | {seen[n] + unseen[n]} | {unseen[n]} | {bar} |")
     note = "The third column counts errors below that of the reference: their ratio is larger."

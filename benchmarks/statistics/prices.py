@@ -26,10 +26,14 @@ from brakecli.errors import CaseError
 from brakecli.runs.limits import check
 from brakecli.runs.run import run
 
-CASES, SEED = 200, 5
-FACTOR, RIGHT = 3.0, 0.9
+CASES = 200
+SEED = 5
+FACTOR = 3.0
+RIGHT = 0.9
 """By which a price may be wrong, and the part of all runs of which it is not."""
-LEAST, MOST, LONGEST = 0.3, 3.0, 60.0
+LEAST = 0.3
+MOST = 3.0
+LONGEST = 60.0
 """Seconds of a run that is priced, at most by intention, and after which it is ended."""
 MOST_TRIES = 10
 HEAD = "## What a run is said to cost"
@@ -72,7 +76,8 @@ def drawn(number: int, seed: int) -> tuple[str, str, Tables]:
     tables = draw(kind, seed, number).tables
     if "roughness" in tables and rng.uniform() < 0.4:
         for surface in tables["roughness"].values():
-            waves, height = int(10.0 ** rng.uniform(1.0, 2.0)), sum(surface["amplitudes"])
+            waves = int(10.0 ** rng.uniform(1.0, 2.0))
+            height = sum(surface["amplitudes"])
             surface["amplitudes"] = [float(each) for each in height / waves * rng.uniform(0.2, 1.8, waves)]
             surface["wavelengths"] = [float(each) for each in 0.03 * 10.0 ** -rng.uniform(0.0, 1.2, waves)]
             surface.pop("phases_deg", None)
@@ -80,7 +85,8 @@ def drawn(number: int, seed: int) -> tuple[str, str, Tables]:
     step = 2.0 * math.pi / rate_of(shoe_of(tables)) / 10.0 ** rng.uniform(1.5, 2.5)
     step = min(step, tables["output"]["sample_interval"])
     tolerance = float(10.0 ** rng.uniform(-5.0 if "layer" in method else -8.0, -2.0))
-    promised, scheme = method.startswith("a tolerance"), method.rpartition(" ")[2]
+    promised = method.startswith("a tolerance")
+    scheme = method.rpartition(" ")[2]
     if scheme == "event-driven" and "roughness" not in tables and rng.uniform() < 0.5:
         method = scheme = "piecewise-exact"
     solver: dict[str, Any] = {"tolerance": tolerance} if promised else {"step": step}
@@ -144,7 +150,8 @@ def main() -> None:
         "--save", type=Path, default=None, help="a file for all that was found, instead of the page"
     )
     given = parser.parse_args()
-    found, work = list[Priced](), [(number, given.seed) for number in range(given.cases)]
+    found = list[Priced]()
+    work = [(number, given.seed) for number in range(given.cases)]
     with multiprocessing.get_context("spawn").Pool(given.workers) as pool:
         for number, each in enumerate(pool.imap_unordered(priced, work), 1):
             if each is not None:

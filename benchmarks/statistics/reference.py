@@ -17,9 +17,15 @@ from benchmarks.statistics.kernels import STAGES, Floats, Shoe, Work, integrate
 Tables = dict[str, Any]
 SIZES = 1e-8  # error of a step over the sizes, in the run that finds these
 TIGHTEST = 1e-17  # such an error of the reference; larger on pads that open, where the exact contact is expensive,
-SHARE, QUICK_SHARE = 1e-12, 1e-8  # where it is this part of the promise; and in tests
-COARSER, SHORTER = 10.0, 1.6  # such errors of the second run over those of the first; its longest step, too
-LONGEST, PER_WAVE = 0.3, 0.5  # rad of the fastest motion and of a passing wave, in a step
+# where it is this part of the promise; and in tests
+SHARE = 1e-12
+QUICK_SHARE = 1e-8
+# such errors of the second run over those of the first; its longest step, too
+COARSER = 10.0
+SHORTER = 1.6
+# rad of the fastest motion and of a passing wave, in a step
+LONGEST = 0.3
+PER_WAVE = 0.5
 CELLS = 16.0  # to the shortest wave
 NOISE = 4e-18  # rounding of a step over the largest motion: no error of a step can be set below it
 REST = 1e-12  # of a motion: below it a quantity is rounding, and counts as none
@@ -47,7 +53,8 @@ class Reference:
 
     def error_of(self, rows: Floats, count: int | None = None) -> float:
         """The largest deviation of other samples, of each quantity over its largest value, up to some sample."""
-        one, other = rows[:count, :4], self.rows[:count]
+        one = rows[:count, :4]
+        other = self.rows[:count]
         if one.shape != other.shape or not np.isfinite(one).all():
             return math.inf
         return float((np.abs(one - other) / self.sizes).max())
@@ -67,7 +74,9 @@ def _sines(table: Tables | None) -> tuple[Floats, Floats, Floats]:
 
 def shoe_of(tables: Tables) -> Shoe:
     """The numbers of a case."""
-    one, two, contact = tables["link1"], tables["link2"], tables["contact"]
+    one = tables["link1"]
+    two = tables["link2"]
+    contact = tables["contact"]
     beta, alpha = (math.radians(each.get("angle_deg", 0.0)) for each in (one, two))
 
     def links(c_1: float, c_2: float) -> tuple[float, float, float]:
@@ -75,8 +84,10 @@ def shoe_of(tables: Tables) -> Shoe:
         xy = c_1 * math.sin(beta) * math.cos(beta) - c_2 * math.sin(alpha) * math.cos(alpha)
         return xx, xy, c_1 * math.cos(beta) ** 2 + c_2 * math.sin(alpha) ** 2
 
-    rough, a = tables.get("roughness", {}), contact["half_length"]
-    (g_1, q_1, p_1), (g_2, q_2, _) = _sines(rough.get("shoe")), _sines(rough.get("wheel"))
+    rough = tables.get("roughness", {})
+    a = contact["half_length"]
+    g_1, q_1, p_1 = _sines(rough.get("shoe"))
+    g_2, q_2, _ = _sines(rough.get("wheel"))
     shortest = 2.0 * math.pi / max([*q_1, *q_2, 2.0 * math.pi / a])
     edges = np.linspace(-a, a, 1 + math.ceil(2.0 * a * CELLS / shortest))
     angles = np.outer(q_2, edges)
@@ -84,10 +95,8 @@ def shoe_of(tables: Tables) -> Shoe:
     area_1 = float((2.0 * g_1 / q_1 * np.sin(q_1 * a) * np.sin(p_1)).sum())
     heights = np.abs([*g_1, *g_2])
     curvature = float((heights * np.array([*q_1, *q_2]) ** 2).sum())
-    stiff, damped = (
-        links(one["stiffness"], two["stiffness"]),
-        links(one.get("damping", 0.0), two.get("damping", 0.0)),
-    )
+    stiff = links(one["stiffness"], two["stiffness"])
+    damped = links(one.get("damping", 0.0), two.get("damping", 0.0))
     return Shoe(
         tables["shoe"]["mass"], *stiff, *damped, math.sin(beta), math.cos(beta), tables["friction"]["coefficient"],
         contact["stiffness"], a, g_1, q_1, p_1, g_2, q_2, edges, f_1, np.sin(angles), np.cos(angles), curvature,
@@ -115,15 +124,19 @@ def _piece(knots: list[tuple[Fraction, Fraction]], t: Fraction) -> tuple[Fractio
 
 def spans_of(tables: Tables, samples: int) -> tuple[Floats, Floats, list[int]]:
     """Rows of `Span` between all samples and knots, the phases there, and which of them end at samples."""
-    interval, radius = Fraction(tables["output"]["sample_interval"]), Fraction(tables["wheel"]["radius"])
+    interval = Fraction(tables["output"]["sample_interval"])
+    radius = Fraction(tables["wheel"]["radius"])
     speeds = [(t, v * radius) for t, v in _schedule(tables["wheel"], "angular_speed", "angular_speeds")]
     loads = _schedule(tables["load"], "force", "forces")
     ends = {interval * n for n in range(samples + 1)}
     stops = sorted(ends | {t for t, _ in speeds + loads if 0 < t < interval * samples})
     _, q_2, p_2 = _sines(tables.get("roughness", {}).get("wheel"))
-    rows, travelled = [], [Fraction(0)]
+    rows = []
+    travelled = [Fraction(0)]
     for t, after in pairwise(stops):
-        (U, U_t), (Q, Q_t), length = _piece(speeds, t), _piece(loads, t), after - t
+        U, U_t = _piece(speeds, t)
+        Q, Q_t = _piece(loads, t)
+        length = after - t
         rows.append([float(each) for each in (length, U, U_t, Q, Q_t)])
         travelled.append(travelled[-1] + (U + U_t * length / 2) * length)
     travel = np.array([float(each) for each in travelled[:-1]], dtype=np.longdouble)
@@ -152,7 +165,8 @@ def motion(
 
     The start is displaced by a part of itself. No step is longer than the longest one over `shorter`.
     """
-    shoe, samples = shoe_of(tables), samples_of(tables)
+    shoe = shoe_of(tables)
+    samples = samples_of(tables)
     spans, phases, at = spans_of(tables, samples)
     passing = max(shoe.q_2, default=0.0) * float(np.abs(spans[:, 1]).max())
     longest = min(LONGEST / rate_of(shoe), PER_WAVE / passing if passing > 0.0 else math.inf) / shorter
@@ -160,7 +174,8 @@ def motion(
     work = Work(
         start * (1.0 + displaced), np.zeros(4), sizes, np.empty((STAGES, 4)), *(np.empty(4) for _ in range(3))
     )
-    sampled, counts = np.empty((len(spans), 4)), np.zeros(5)
+    sampled = np.empty((len(spans), 4))
+    counts = np.zeros(5)
     if not integrate(shoe, spans, phases, work, longest, tolerance, sampled, counts):
         return None
     return np.vstack([start, sampled[at]]), counts
@@ -168,9 +183,11 @@ def motion(
 
 def static_sizes(tables: Tables) -> Floats:
     """Sizes of x, y, vx and vy from load, heights and start."""
-    shoe, spans = shoe_of(tables), spans_of(tables, 1)[0]
+    shoe = shoe_of(tables)
+    spans = spans_of(tables, 1)[0]
     loads = [abs(float(value)) for _, value in _schedule(tables["load"], "force", "forces")]
-    start, rate = tables.get("initial", {}), rate_of(shoe)
+    start = tables.get("initial", {})
+    rate = rate_of(shoe)
     size = max(loads) / (shoe.c_yy + 2.0 * shoe.a * shoe.k) + shoe.height
     size += abs(start.get("x", 0.0)) + abs(start.get("y", 0.0))
     size += (abs(start.get("vx", 0.0)) + abs(start.get("vy", 0.0)) + 1e-3 * abs(spans[0, 1])) / rate

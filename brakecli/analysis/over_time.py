@@ -15,7 +15,9 @@ from brakecli.solver.system import System
 
 CYCLES = 20.0  # of the lower natural frequency in a window
 SHORTEST = 2.0  # cycles in a quarter of a window, without which nothing is said
-FEWEST_WINDOWS, MOST_WINDOWS = 8, 100  # without overlap; windows overlap by three quarters
+# without overlap; windows overlap by three quarters
+FEWEST_WINDOWS = 8
+MOST_WINDOWS = 100
 HIGHEST = 10.0  # times the higher natural frequency: up to here spectra are kept
 LINES = 1024  # most of a short-time spectrum; neighbours are averaged
 LOUD = 0.05  # part of the largest amplitude of vx from which it vibrates

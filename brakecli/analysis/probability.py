@@ -30,7 +30,8 @@ class Probability(NamedTuple):
         Of a single set, whose samples are independent, and where no set differs: Wilson's interval.
         """
         shares = hits.mean(axis=1)
-        value, spread = float(shares.mean()), float(shares.std(ddof=1)) if len(shares) > 1 else 0.0
+        value = float(shares.mean())
+        spread = float(shares.std(ddof=1)) if len(shares) > 1 else 0.0
         if spread == 0.0:
             wilson = stats.binomtest(int(hits.sum()), hits.size).proportion_ci(LEVEL, method="wilson")
             return cls(value, float(wilson.low), float(wilson.high))

@@ -37,7 +37,8 @@ def readings_told(*, force_read: bool = False) -> Iterator[None]:
     import brakecli.accessor  # noqa: F401 - which xarray objects have from then on
     from brakecli.case.roughness import arrays
 
-    said, before = list[str](), arrays.set({})
+    said = list[str]()
+    before = arrays.set({})
     readings.begin(said.append, forced=force_read)
     try:
         yield

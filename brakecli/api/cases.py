@@ -212,7 +212,8 @@ def advise(
         from brakecli.runs.limits import within_range
         from brakecli.runs.run import load_kernels
 
-        patterns, margin = KEYS if keys is None else patterns_of(keys), margin_of(margin)
+        patterns = KEYS if keys is None else patterns_of(keys)
+        margin = margin_of(margin)
         study = replace(study_of(scatter), base=loaded) if scatter is not None else None
         load_kernels(loaded)
         with within_range():

@@ -126,7 +126,8 @@ def plot(
     from brakecli.plots.result import plot_result, plot_signal
 
     measured = measured_of("plot", quantity, belt_speed, stiffness, reading)
-    shown, cut = text_of(variable, "variable"), text_of(section, "section")
+    shown = text_of(variable, "variable")
+    cut = text_of(section, "section")
     with (
         interruptible(),
         readings_told(force_read=force_read),

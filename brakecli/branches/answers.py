@@ -172,7 +172,8 @@ class Answers:
                 continue
             for part in stable_parts(followed):
                 for begin, end in self.stable_spans:
-                    left, right = max(part.low.p, begin), min(part.high.p, end)
+                    left = max(part.low.p, begin)
+                    right = min(part.high.p, end)
                     if right > left + NARROWEST:
                         found.append((left, right, part.frequency))
         return sorted(found)

@@ -54,10 +54,8 @@ class Bound(NamedTuple):
         """Where the end is with finer steps; None where it is not found."""
         if self.inner is None or self.beyond is None:
             return None
-        newton, (one, other) = (
-            Newton(finer, Settings()),
-            sorted((self.inner, self.beyond), key=lambda each: each.s),
-        )
+        newton = Newton(finer, Settings())
+        one, other = sorted((self.inner, self.beyond), key=lambda each: each.s)
         finer.use(one.chart)
         for apart in STRIDES:
             ends = [
@@ -79,19 +77,29 @@ def located(newton: Newton, one: Point, other: Point) -> float:
     By the Illinois method and by halves in turns: without damping the multiplier stays beside the circle up to
     there, and then leaves it like a root.
     """
-    low, high, p, side = _outside(one), _outside(other), one.p, 0
+    low = _outside(one)
+    high = _outside(other)
+    p = one.p
+    side = 0
     for turn in range(ROUNDS):
         part = 0.5 if turn % 2 else zero(low, high)
         middle = newton.between(one, other, part) or newton.between(one, other, 0.5)
         if middle is None:
             break
-        moved, p = abs(middle.p - p), middle.p
+        moved = abs(middle.p - p)
+        p = middle.p
         if moved < LOCATED:
             return p
         if middle.stable is one.stable:
-            one, low, high, side = middle, _outside(middle), high * (0.5 if side == 1 else 1.0), 1
+            one = middle
+            low = _outside(middle)
+            high = high * (0.5 if side == 1 else 1.0)
+            side = 1
         else:
-            other, high, low, side = middle, _outside(middle), low * (0.5 if side == -1 else 1.0), -1
+            other = middle
+            high = _outside(middle)
+            low = low * (0.5 if side == -1 else 1.0)
+            side = -1
     return 0.5 * (one.p + other.p)
 
 

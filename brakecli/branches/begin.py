@@ -25,9 +25,11 @@ NEARS = 1.0
 AHEAD = 10_000
 """Steps without an event, at least, of such a motion."""
 
-SETTLE, SEEN = 400, 8
+SETTLE = 400
+SEEN = 8
 """Periods of the mode for which a motion of a rough shoe is left to itself, and in which returns are sought."""
-LOOKS, SOONEST = 60, 12
+LOOKS = 60
+SOONEST = 12
 """Places of a period at which the motion is looked at, and after how many it may have returned."""
 PARTS = 4
 """Parts of a period that a motion left to itself is carried at a time, and places whose return is sought."""
@@ -56,7 +58,8 @@ class End(NamedTuple):
     rate: float | None = None
 
 
-FADES, UNKNOWN = End(False), End(None)
+FADES = End(False)
+UNKNOWN = End(None)
 
 
 def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
@@ -96,10 +99,12 @@ def settled(problem: Cycles, p: float, state: Array, frequency: float) -> Point 
     """
     if not problem.line.smooth:
         return _returning(problem, p, state, frequency)
-    end, flow = on_smooth_pads(problem.line.shoe(p), state), problem.flow(p)
+    end = on_smooth_pads(problem.line.shoe(p), state)
+    flow = problem.flow(p)
     if end.orbit is None:
         return None
-    state, period = np.array(end.orbit.state), end.orbit.period
+    state = np.array(end.orbit.state)
+    period = end.orbit.period
     if flow(state, period, False) != DONE:
         return None
     sizes = 0.5 * (flow.path.high - flow.path.low)
@@ -122,7 +127,9 @@ def _started(
 
 def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:
     """The cycle of a rough shoe whose motion returns to itself."""
-    flow, rest, period = problem.flow(p), problem.rest(p), 1.0 / frequency
+    flow = problem.flow(p)
+    rest = problem.rest(p)
+    period = 1.0 / frequency
     states = [np.array(state, float)]
     for k in range(SETTLE * PARTS + SEEN * LOOKS):
         if flow(states[-1], period * (1.0 / PARTS if k < SETTLE * PARTS else 1.0 / LOOKS), False) != DONE:
@@ -133,7 +140,8 @@ def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Poi
     if not size > AT_REST * abs(rest[1]):
         return None
     omega = 2.0 * math.pi * frequency
-    scales, x = size * np.array([1.0, 1.0, omega, omega]), 0.5 * float(np.ptp(seen[:, 0]))
+    scales = size * np.array([1.0, 1.0, omega, omega])
+    x = 0.5 * float(np.ptp(seen[:, 0]))
     belt = problem.line.shoe(p).belt
     places = [k for k in range(LOOKS) if abs(seen[k, 2] - belt) > CLEAR * abs(belt)]
     tries = 0

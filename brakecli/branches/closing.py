@@ -87,9 +87,11 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
         away = here.z - first.z
         if math.sqrt(away @ away) > PASSES * (new.s - here.s):
             return None, None
-    one, other = here, new
+    one = here
+    other = new
     for _ in range(NARROWED):
-        low, high = ahead(one), ahead(other)
+        low = ahead(one)
+        high = ahead(other)
         middle = newton.between(one, other, zero(low, high))
         if middle is None or middle.word != here.word:
             return None, None
@@ -98,12 +100,16 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
             break
         one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)
     nearest = min((one, other), key=lambda point: abs(ahead(point)))
-    place, onward, chart = nearest.z, nearest.tangent, new.chart
+    place = nearest.z
+    onward = nearest.tangent
+    chart = new.chart
     if foreign:
         guess = newton.problem.carried(nearest, first.chart)
         if guess is None:
             return None, None
-        place, onward, chart = np.append(guess[0], nearest.p), guess[1], first.chart
+        place = np.append(guess[0], nearest.p)
+        onward = guess[1]
+        chart = first.chart
     newton.problem.use(chart)
     place = place - first.tangent * ((place - first.z) @ first.tangent)
     crossing = newton.solved(place, first.tangent, onward, nearest.s, exact=True)

@@ -38,10 +38,12 @@ INSTANT = 1e-12
 """Part of the period that a flow takes at least: it has no step of no length."""
 BEGUN = 1e-9
 """Part of the period in which the direction of the flow is found at a state: nothing turns within it."""
-LOOKED, CORRECTED = 256, 8
+LOOKED = 256
+CORRECTED = 8
 """Places of a cycle at which it is compared with another chart, and corrections of the nearest by Newton's
 method. Choices."""
-SHORTEST, LONGEST = 1e-3, 400.0
+SHORTEST = 1e-3
+LONGEST = 400.0
 """Periods of a chart between which a period is sought."""
 
 
@@ -97,7 +99,8 @@ class Cycles(Problem):
 
     def __init__(self, line: Line, periods: int = 1) -> None:
         """`periods`: of the motions from which these have been doubled."""
-        self.line, self.periods = line, periods
+        self.line = line
+        self.periods = periods
         self.flow = lru_cache(maxsize=16)(self._flow)
         self.rest = lru_cache(maxsize=64)(self._rest)
 
@@ -124,7 +127,8 @@ class Cycles(Problem):
         if not SHORTEST < periods < LONGEST:
             return "the period vanishes, or grows without bound"
         try:
-            flow, rest = self.flow(p), self.rest(p)
+            flow = self.flow(p)
+            rest = self.rest(p)
         except CaseError as error:
             return str(error)
         how = self._over_period(flow, rest + u[:4] * chart.scales, periods, chart, derivative)
@@ -136,23 +140,32 @@ class Cycles(Problem):
 
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
         """Carry the state over the period; the gap, its derivatives and M across the flow."""
-        chart, flow = self.chart, self._flown(u, p, self.chart)
+        chart = self.chart
+        flow = self._flown(u, p, self.chart)
         if isinstance(flow, str):
             return flow
-        rest, path, scales = self.rest(p), flow.path, chart.scales
+        rest = self.rest(p)
+        path = flow.path
+        scales = chart.scales
         matrix = flow.derivative * scales / scales[:, None]
         end = (flow.state - rest) / scales
         speed = path.velocity / scales
-        by_u, gap = np.zeros((5, 5)), np.empty(5)
-        by_u[:4, :4], by_u[:4, 4], by_u[4, :4] = matrix, speed * chart.time, chart.normal
+        by_u = np.zeros((5, 5))
+        gap = np.empty(5)
+        by_u[:4, :4] = matrix
+        by_u[:4, 4] = speed * chart.time
+        by_u[4, :4] = chart.normal
         by_u.ravel()[0:24:6] -= 1.0
-        gap[:4], gap[4] = end - u[:4], chart.normal @ (u[:4] - chart.place)
+        gap[:4] = end - u[:4]
+        gap[4] = chart.normal @ (u[:4] - chart.place)
         across = float(chart.normal @ speed)
         if across == 0.0:
             return "the flow runs along its plane"
         moved = matrix @ chart.basis
         on_plane = moved - (speed / across)[:, None] * (chart.normal @ moved)
-        word, spent, period = flow.word, path.spent, float(path.time)
+        word = flow.word
+        spent = path.spent
+        period = float(path.time)
         facts = Orbit(
             period,
             0.5 * float(path.high[0] - path.low[0]),
@@ -186,7 +199,8 @@ class Cycles(Problem):
 
     def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
         """How far a cycle in slip alone is from stick, and one that does not fly from flight, of order one."""
-        found, belt = [], self.line.shoe(p).belt
+        found = []
+        belt = self.line.shoe(p).belt
         sliding = BACKWARD if belt > 0.0 else FORWARD
         if not set(word) - {sliding, OPEN}:
             fastest = high[2] if sliding == BACKWARD else low[2]
@@ -216,7 +230,8 @@ class Cycles(Problem):
 
     def renewed(self, point: Point) -> Guess | None:
         """A chart of the present size, with its anchor far from events, where either has become necessary."""
-        cycle, chart = point.facts, point.chart
+        cycle = point.facts
+        chart = point.chart
         times = cycle.times or (cycle.period,)
         near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
         grown = cycle.amplitude / chart.size
@@ -258,8 +273,11 @@ class Cycles(Problem):
 
     def carried(self, point: Point, chart: Chart) -> Guess | None:
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
-        cycle, flow, rest = point.facts, self.flow(point.p), self.rest(point.p)
-        state, best = np.array(cycle.state), (math.inf, 0.0)
+        cycle = point.facts
+        flow = self.flow(point.p)
+        rest = self.rest(point.p)
+        state = np.array(cycle.state)
+        best = (math.inf, 0.0)
         for part in np.linspace(0.0, 1.0, LOOKED + 1)[:-1]:
             if flow(state, max(part, INSTANT) * cycle.period, False) != DONE:
                 return None
@@ -269,7 +287,8 @@ class Cycles(Problem):
         for _ in range(CORRECTED):  # Newton's method for the time at which the plane is passed
             if flow(state, max(ahead % cycle.period, INSTANT * cycle.period), False) != DONE:
                 return None
-            off, speed = (flow.state - rest) / chart.scales - chart.place, flow.path.velocity / chart.scales
+            off = (flow.state - rest) / chart.scales - chart.place
+            speed = flow.path.velocity / chart.scales
             ahead -= float(chart.normal @ off) / float(chart.normal @ speed)
         ahead %= cycle.period
         if flow(state, max(ahead, INSTANT * cycle.period), False) != DONE:

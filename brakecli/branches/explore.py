@@ -37,7 +37,9 @@ MEETS = 16
 """Motions of a branch that are looked for on another one; a choice."""
 LONGEST = 0.25
 """Longest stride, in sizes of the motion and of the range."""
-POINTS, ALL_POINTS, SECONDS = 3000, 10_000, 60.0
+POINTS = 3000
+ALL_POINTS = 10_000
+SECONDS = 60.0
 """Budgets: of points of one branch and of all of them, and of time."""
 GROWING_POINTS = 300
 """Budget of points in which the waves grow to their size; a choice."""
@@ -83,8 +85,12 @@ class Explorer:
         The budget of `points` is that of all branches; that of `seconds` is for a user who waits. Where the same
         bytes must come out again, it is infinite.
         """
-        self.line, self.tell, self.stop = line, tell, stop
-        self.end, self.count, self.points = perf_counter() + seconds, 0, points
+        self.line = line
+        self.tell = tell
+        self.stop = stop
+        self.end = perf_counter() + seconds
+        self.count = 0
+        self.points = points
         self.sliding = Sliding(line)
         self.slides = self.sliding.along()
         self.changes = self.sliding.changes(self.slides)
@@ -158,7 +164,9 @@ class Explorer:
 
     def _until(self, problem: Problem, first: Point) -> Callable[[Point], str | None]:
         """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""
-        begun, smooth, left = first.facts.amplitude, self.line.smooth, [False]
+        begun = first.facts.amplitude
+        smooth = self.line.smooth
+        left = [False]
         cycles = isinstance(problem, Cycles)
 
         def until(point: Point) -> str | None:
@@ -237,7 +245,8 @@ class Explorer:
         if values is not None:
             least_stable = abs(float(values[int(np.argmax(values.real))].imag))
             frequency = (least_stable or float(np.abs(values.imag).max())) / (2.0 * math.pi)
-        value, problem = self.line.value(p), self._problem()
+        value = self.line.value(p)
+        problem = self._problem()
         first = settled(problem, p, state, frequency) if frequency else None
         if first is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no limit cycle")
@@ -249,7 +258,9 @@ class Explorer:
 
     def _islands(self, pushes: int) -> None:
         """The branches of cycles that pushes come to, if they are not known: each within the whole budget."""
-        begun, search, budget = perf_counter(), self.search, self.points
+        begun = perf_counter()
+        search = self.search
+        budget = self.points
         most = len(self.branches) + MOST_PUSHED
         own = None if self.line.own is None else self.line.place(self.line.own)
         for p, first, count in places(self.slides, self.changes, own, pushes):
@@ -266,7 +277,8 @@ class Explorer:
 
     def _from_push(self, p: float, state: Any, most: int) -> None:
         """The branch of the cycle that a push has come to, among so many; none where it is known already."""
-        value, problem = self.line.value(p), self._problem()
+        value = self.line.value(p)
+        problem = self._problem()
         first = settled(problem, p, state, math.nan)
         if first is not None and self._known(first):
             return

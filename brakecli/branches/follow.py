@@ -108,7 +108,10 @@ class _Walk:
     """The walk along one branch, with its budgets."""
 
     def __init__(self, problem: Problem, settings: Settings, until: Until | None, stop: Stop | None) -> None:
-        self.problem, self.settings, self.until, self.stop = problem, settings, until, stop
+        self.problem = problem
+        self.settings = settings
+        self.until = until
+        self.stop = stop
         self.newton = Newton(problem, settings)
         self.deadline = perf_counter() + settings.seconds
         self.count = 0
@@ -123,7 +126,9 @@ class _Walk:
 
     def followed(self, first: Point) -> tuple[list[Point], End]:
         """The points in one direction, and why they end."""
-        settings, points, stride = self.settings, [first], self.settings.first
+        settings = self.settings
+        points = [first]
+        stride = self.settings.first
         self.problem.use(first.chart)
         if self._at_bound(first):
             return points, self._range_end(first.p)
@@ -137,7 +142,8 @@ class _Walk:
             if new is None:
                 seen = self.newton.seen
                 beyond = seen is not None and seen.word != here.word
-                before, stride = stride, stride * (STRIDES.from_border if beyond else STRIDES.failed)
+                before = stride
+                stride = stride * (STRIDES.from_border if beyond else STRIDES.failed)
                 # a corner is tried as soon as the border is near, and at last in any case
                 if stride >= settings.shortest and not (beyond and stride < settings.border <= before):
                     continue
@@ -189,7 +195,9 @@ class _Walk:
 
     def _step(self, points: list[Point], stride: float) -> Point | None:
         """One stride: the next point, or None where it must be shorter."""
-        here, newton, settings = points[-1], self.newton, self.settings
+        here = points[-1]
+        newton = self.newton
+        settings = self.settings
         guess = self._predicted(points, stride)
         p = guess[-1]
         if not settings.low <= p <= settings.high:
@@ -255,7 +263,8 @@ class _Walk:
         if here.tangent[-1] * new.tangent[-1] >= 0.0 or here.word != new.word:
             return None
         t = GRID
-        rise, way = new.p - here.p, new.s - here.s
+        rise = new.p - here.p
+        way = new.s - here.s
         cubic = here.p + (3.0 * t**2 - 2.0 * t**3) * rise
         cubic += t * (1.0 - t) * way * ((1.0 - t) * here.tangent[-1] - t * new.tangent[-1])
         outside = np.flatnonzero((cubic > self.settings.high) | (cubic < self.settings.low))
@@ -278,7 +287,8 @@ class _Walk:
         )
         ratio = max(angle, change / settings.change, STRIDES.straightest)
         if here.word == new.word:
-            long, repeated = stride > STRIDES.fine * settings.shortest, STRIDES.repeated
+            long = stride > STRIDES.fine * settings.shortest
+            repeated = STRIDES.repeated
             if ratio > repeated and (long or angle > repeated):
                 return max(STRIDES.shortest, STRIDES.aim_again / ratio) * stride, 0.0
         elif stride > settings.border and ratio > STRIDES.at_border:

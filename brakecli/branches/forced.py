@@ -73,7 +73,9 @@ class Forced(Doubled):
 
     def __init__(self, system: Callable[[float], System], frame: Frame, periods: int = 1) -> None:
         """`system` raises CaseError where a place is invalid; `periods`: common periods until a motion repeats."""
-        self.system, self.frame, self.periods = system, frame, periods
+        self.system = system
+        self.frame = frame
+        self.periods = periods
         self.flow = lru_cache(maxsize=16)(self._flow)
         self.origin = lru_cache(maxsize=64)(frame.origin)
 
@@ -116,9 +118,13 @@ class Forced(Doubled):
             flow, period = self.flow(p)
         except (CaseError, ValueError) as error:
             return str(error)
-        frame, origin, belt = self.frame, self.origin(p), flow.system.belt_speed
+        frame = self.frame
+        origin = self.origin(p)
+        belt = flow.system.belt_speed
         states = origin + u.reshape(-1, 4) * frame.scales
-        length, runs, word = period / frame.segments, list[Flown](), list[int]()
+        length = period / frame.segments
+        runs = list[Flown]()
+        word = list[int]()
         for k, state in enumerate(states):
             if abs(state[2] - belt) <= SNAP * frame.scales[2]:
                 state[2] = belt
@@ -137,7 +143,9 @@ class Forced(Doubled):
         found = self._flown(u, p)
         if isinstance(found, str):
             return found
-        m, scales, runs = self.segments, self.frame.scales, found.runs
+        m = self.segments
+        scales = self.frame.scales
+        runs = found.runs
         maps = np.array([run.derivative for run in runs]) * (scales / scales[:, None])
         if not np.isfinite(maps).all():
             return "disturbances grow without bound"
@@ -163,7 +171,8 @@ class Forced(Doubled):
 
     def _facts(self, u: Array, p: float, found: _Flown) -> Orbit:
         runs = found.runs
-        margins, segment = [run.margins for run in runs], found.period / len(runs)
+        margins = [run.margins for run in runs]
+        segment = found.period / len(runs)
         return Orbit(
             found.period,
             0.5 * (max(run.x[1] for run in runs) - min(run.x[0] for run in runs)),
@@ -248,7 +257,8 @@ class Forced(Doubled):
         The run goes on for `waited` common periods. Then motions of 1, 2, ... and at most `most` of them are
         sought.
         """
-        origin, frame = self.origin(p), self.frame
+        origin = self.origin(p)
+        frame = self.frame
         one = self.of_periods(1)
         visited = [(np.asarray(state, float) - origin) / frame.scales]
         for n in range((waited + most) * frame.segments):
@@ -289,7 +299,8 @@ class Forced(Doubled):
             flow, period = self.flow(p)
         except (CaseError, ValueError):
             return None
-        frame, origin = self.frame, self.origin(p)
+        frame = self.frame
+        origin = self.origin(p)
         length = period / frame.segments
         run = flow(origin + u * frame.scales, k * length, length, frame.steps, False)
         return (run.state - origin) / frame.scales if run.status is Status.DONE else None

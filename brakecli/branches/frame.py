@@ -41,7 +41,8 @@ class Frame:
             return np.append(xy[0], [0.0, 0.0])
         k = min(max(int(p * last), 0), last - 1)
         t = p * last - k
-        here, there = xy[k], xy[k + 1]
+        here = xy[k]
+        there = xy[k + 1]
         begin = 0.5 * (there - xy[k - 1]) if k > 0 else there - here
         end = 0.5 * (xy[k + 2] - here) if k + 2 <= last else there - here
         chord = there - here

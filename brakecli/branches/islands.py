@@ -92,19 +92,25 @@ def pushes(first: int, count: int, smallest: float) -> Array:
     """
     numbers = np.arange(first + 1, first + count + 1)[:, None]
     size, share, one, other = (numbers * _TURNED ** -np.arange(1.0, 5.0) % 1.0).T
-    one, other = 2.0 * math.pi * one, 2.0 * math.pi * other
-    along, across = np.sqrt(share), np.sqrt(1.0 - share)
+    one = 2.0 * math.pi * one
+    other = 2.0 * math.pi * other
+    along = np.sqrt(share)
+    across = np.sqrt(1.0 - share)
     sphere = np.array([along * np.cos(one), across * np.cos(other), along * np.sin(one), across * np.sin(other)])
     return np.asarray((smallest * (LARGEST / smallest) ** size * sphere).T)
 
 
 def tried(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> Tried:
     """What the pushes from a number on come to."""
-    c, orbits, undecided, done = shoe.coefficients, list[Orbit](), 0, 0
+    c = shoe.coefficients
+    orbits = list[Orbit]()
+    undecided = 0
+    done = 0
     if shoe.rest is None or not shoe.rest[1] < 0.0:
         return Tried(0, 0, [])
     fastest = math.sqrt((c.c_xx + c.c_yy + shoe.stiffness) / c.m)  # rad/s; at most this, by the trace
-    rest, depth = np.array([*shoe.rest, 0.0, 0.0]), -shoe.rest[1]
+    rest = np.array([*shoe.rest, 0.0, 0.0])
+    depth = -shoe.rest[1]
     scales = depth * np.array([1.0, 1.0, fastest, fastest])
     longest = LONGEST * 2.0 * math.pi / fastest
     smallest = SMALLEST * min(1.0, abs(shoe.belt) / (fastest * depth))

@@ -49,9 +49,13 @@ class Shoe(NamedTuple):
     @property
     def rest(self) -> tuple[float, float] | None:
         """x and y (m) of steady sliding: (6)-(7) without motion, linear in full contact. None where it locks."""
-        c, k = self.coefficients, self.stiffness
-        s_xy, s_yy = c.c_xy + c.grip(self.belt) * k, c.c_yy + k
-        determinant, q_x, q_y = c.c_xx * s_yy - s_xy * c.c_xy, self.load * c.sin_beta, self.load * c.cos_beta
+        c = self.coefficients
+        k = self.stiffness
+        s_xy = c.c_xy + c.grip(self.belt) * k
+        s_yy = c.c_yy + k
+        determinant = c.c_xx * s_yy - s_xy * c.c_xy
+        q_x = self.load * c.sin_beta
+        q_y = self.load * c.cos_beta
         if not determinant > 0.0:
             return None
         return (s_xy * q_y - s_yy * q_x) / determinant, (c.c_xy * q_x - c.c_xx * q_y) / determinant
@@ -71,9 +75,14 @@ class Line:
     ) -> None:
         """`label` is what messages of problems call the line; `adapted` changes each system of it."""
         self._adapted = adapted
-        self.case, self.keys, self.low, self.high, self.label = case, tuple(keys), low, high, label
+        self.case = case
+        self.keys = tuple(keys)
+        self.low = low
+        self.high = high
+        self.label = label
         self._paths = [key_path(key) for key in keys]
-        given, touched = case.model_dump(exclude_unset=True), {path[0] for path in self._paths if path}
+        given = case.model_dump(exclude_unset=True)
+        touched = {path[0] for path in self._paths if path}
         self._given = {
             name: getattr(case, name) if name in ALONE - touched else table for name, table in given.items()
         }
@@ -128,7 +137,8 @@ class Line:
 
         Raises CaseError where it is nowhere valid, and where speed or load change.
         """
-        found, failed = dict[int, System](), None
+        found = dict[int, System]()
+        failed = None
         for k in range(places):
             try:
                 found[k] = self.system(k / (places - 1))

@@ -48,13 +48,15 @@ class Spectrum(NamedTuple):
 
 def product(maps: Array) -> tuple[Array, float]:
     """Return the product divided by its size, and the logarithm of its size, so that nothing overflows."""
-    total, log = maps[0], 0.0
+    total = maps[0]
+    log = 0.0
     for k in range(len(maps)):
         if k:
             total = maps[k] @ total
         size = float(np.abs(total).max())
         if 1e-300 < size < math.inf and not 1.0 / SCALED < size < SCALED:
-            total, log = total / size, log + math.log(size)
+            total = total / size
+            log = log + math.log(size)
     return total, log
 
 
@@ -91,7 +93,8 @@ def resonant_pair(multipliers: Any) -> tuple[complex, complex] | None:
 
 def _asinh(factors: Iterable[tuple[complex, float]], error: float) -> float:
     """asinh of a product of factors with their errors, through its logarithm."""
-    log, phase = 0.0, 1.0 + 0.0j
+    log = 0.0
+    phase = 1.0 + 0.0j
     for factor, bound in factors:
         size = abs(factor)
         if error > UNKNOWN and size < SURE * bound:

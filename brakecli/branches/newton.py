@@ -17,7 +17,8 @@ STALLS = 0.3
 """Size of a correction over the one before, beyond which rounding keeps it from becoming smaller."""
 FROM_AFAR = 15
 """Evaluations for a point that no neighbour on its branch predicts."""
-LEFT, OFF = 0.5, 1e-7
+LEFT = 0.5
+OFF = 1e-7
 """A point has left its branch that lies farther off its guess than this part of a stride, and this length."""
 SHORT = 1e-6
 """Chord whose direction is mostly rounding."""
@@ -79,7 +80,8 @@ class Newton:
 
     def __init__(self, problem: Problem, settings: Settings) -> None:
         """Nothing is evaluated yet."""
-        self.problem, self.settings = problem, settings
+        self.problem = problem
+        self.settings = settings
         self.evaluations = 0
         self.why = ""
         """Why the last correction failed."""
@@ -110,14 +112,22 @@ class Newton:
         settings = self.settings
         self.seen = self.outside = None
         n = len(guess) - 1
-        matrix, right = np.empty((n + 1, n + 1)), np.zeros((n + 1, 2))
-        matrix[n], right[n, 1] = normal, 1.0
-        z, last, before, lever = guess.copy(), math.inf, math.inf, 1.0
-        by_p, word, taken = None, None, z
+        matrix = np.empty((n + 1, n + 1))
+        right = np.zeros((n + 1, 2))
+        matrix[n] = normal
+        right[n, 1] = 1.0
+        z = guess.copy()
+        last = math.inf
+        before = math.inf
+        lever = 1.0
+        by_p = None
+        word = None
+        taken = z
         slack = ROUNDING * (settings.high - settings.low)
         for _ in range(most or settings.iterations):
             if not settings.low - slack <= z[n] <= settings.high + slack:
-                self.outside, self.why = z, "the parameter leaves its range"
+                self.outside = z
+                self.why = "the parameter leaves its range"
                 return None
             seen = self.evaluate(z, by_p is None or exact)
             if seen is not None and seen.by_p is None and seen.word != word:
@@ -125,13 +135,17 @@ class Newton:
             if seen is None:
                 return None
             if seen.by_p is not None:
-                by_p, word, taken = seen.by_p, seen.word, z
+                by_p = seen.by_p
+                word = seen.word
+                taken = z
             gap = float(np.abs(seen.gap).max())
             if not gap <= GROWS * last + ROUNDING:
                 break
             last = gap
-            matrix[:n, :n], matrix[:n, n] = seen.by_u, by_p
-            right[:n, 0], right[n, 0] = -seen.gap, normal @ (guess - z)
+            matrix[:n, :n] = seen.by_u
+            matrix[:n, n] = by_p
+            right[:n, 0] = -seen.gap
+            right[n, 0] = normal @ (guess - z)
             step, tangent, length = self._solution(matrix, right)
             size = float(np.abs(step).max())
             near = settings.exact if exact else max(settings.near * min(seen.size, 1.0), settings.exact)
@@ -175,7 +189,8 @@ class Newton:
     ) -> Point:
         sign, log = np.linalg.slogdet(matrix)
         if tangent @ onward < 0.0:
-            tangent, sign = -tangent, -sign
+            tangent = -tangent
+            sign = -sign
         multipliers = spectrum(seen.maps)
         return Point(
             z=z,
@@ -216,13 +231,15 @@ class Newton:
         length = math.sqrt(chord @ chord)
         if length == 0.0:
             return None
-        t, way = part, other.s - one.s
+        t = part
+        way = other.s - one.s
         if one.word == other.word:
             onward = one.tangent + other.tangent
             guess = one.z + (3.0 * t**2 - 2.0 * t**3) * chord
             guess += (t * (1.0 - t) * way) * ((1.0 - t) * one.tangent - t * other.tangent)
         else:
-            onward, guess = chord, one.z + t * chord
+            onward = chord
+            guess = one.z + t * chord
         # the direction of a very short chord is mostly rounding
         normal = chord / length if length > SHORT else one.tangent
         found = self.solved(guess, normal, onward, one.s + t * way, exact=True)

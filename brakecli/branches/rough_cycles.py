@@ -23,7 +23,8 @@ PLACES = 9
 """Places of the range at which the cells are counted that are enough."""
 STEPS = 80.0
 """Steps to the fastest period: a period is short, and the pad lifts off and lands in few of them."""
-SHORTER, LONGER = 0.6, 1.6
+SHORTER = 0.6
+LONGER = 1.6
 """Periods of a chart between which its number of steps fits."""
 INSTANT = 1e-12
 """Part of the fastest period after which the velocity of the begin is read."""
@@ -46,7 +47,8 @@ class Span:
 
     def __init__(self, flow: RoughFlow, per_period: float) -> None:
         """With so many steps to the fastest period."""
-        self._flow, self._per_period = flow, per_period
+        self._flow = flow
+        self._per_period = per_period
         self._instant = INSTANT / flow.system.natural_frequencies[1]
 
     def __call__(self, state: Array, span: float, tangents: bool = True) -> int:
@@ -59,20 +61,27 @@ class Span:
 
     def over(self, state: Array, span: float, steps: int, tangents: bool) -> int:
         """Carry a state over a span in so many steps."""
-        self._begin, self._time = np.array(state), span
+        self._begin = np.array(state)
+        self._time = span
         run = self._run = self._flow(self._begin, 0.0, span, steps, tangents)
-        self.state, self.word, self.times = run.state, run.word, run.times
+        self.state = run.state
+        self.word = run.word
+        self.times = run.times
         self.derivative: Any = run.derivative  # None where it was not asked for
         return _ENDS.get(run.status, LONG)
 
     @property
     def path(self) -> Way:
         """See `Flow`."""
-        run, belt = self._run, self._flow.system.belt_speed
+        run = self._run
+        belt = self._flow.system.belt_speed
         start = self._flow(self._begin, 0.0, self._instant, 1, False).velocity
-        spent, least = np.zeros(4), run.margins.slide
-        spent[STICK], spent[OPEN] = run.margins.stick_share * self._time, run.margins.open_share * self._time
-        low, high = np.array([run.x[0], run.y[0], belt + least]), np.array([run.x[1], run.y[1], belt - least])
+        spent = np.zeros(4)
+        least = run.margins.slide
+        spent[STICK] = run.margins.stick_share * self._time
+        spent[OPEN] = run.margins.open_share * self._time
+        low = np.array([run.x[0], run.y[0], belt + least])
+        high = np.array([run.x[1], run.y[1], belt - least])
         return Way(start, run.velocity, self._time, spent, low, high)
 
 
@@ -89,7 +98,8 @@ class RoughCycles(Cycles):
         if any(system.wheel.g.size for system in systems):
             wrong = "the wheel is rough, so no motion repeats but those that its waves force"
             raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
-        self.per_period, self.cells = per_period, max(map(default_cells, systems))
+        self.per_period = per_period
+        self.cells = max(map(default_cells, systems))
 
     def _flow(self, p: float) -> Flow:
         return Span(RoughFlow(self.line.system(p), self.cells), self.per_period)

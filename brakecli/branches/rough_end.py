@@ -28,7 +28,8 @@ AT_CALM = 1e-9
 """Distance from a calm motion, over the compression of the pad, that is rounding."""
 KEPT = 0.99
 """Part of its distance from all calm motions that a vibration which lasts keeps in a time twice as long."""
-DRIFTS, STILL = 4.0, 1e-6
+DRIFTS = 4.0
+STILL = 1e-6
 """Standard errors of its slope beyond which that distance falls, and a fall that is none. Beside a value at which
 a vibration vanishes a motion keeps nearly all of its distance for long, but it falls steadily."""
 SETTLING = 1.0
@@ -45,7 +46,8 @@ class _Span:
     """
 
     def __init__(self, system: System) -> None:
-        self.flow, slow = RoughFlow(system), system.natural_frequencies[0]
+        self.flow = RoughFlow(system)
+        slow = system.natural_frequencies[0]
         period = common_period(system) or SPAN / slow
         self.length = period * math.ceil(SPAN / (slow * period))
         self.parts = math.ceil(self.length * slow)
@@ -61,7 +63,9 @@ class _Span:
 
     def __call__(self, state: Array, tangents: bool) -> tuple[Array, Array] | None:
         """The states at the ends of all parts, and the derivative of the last one; None where there is no flow."""
-        states, matrix, length = [state], np.eye(4), self.length / self.parts
+        states = [state]
+        matrix = np.eye(4)
+        length = self.length / self.parts
         for part in range(self.parts):
             run = self.flow(states[-1], part * length, length, self.steps, tangents)
             if run.status is not Status.DONE or signalled():
@@ -76,7 +80,8 @@ class _Calm:
     """A stable motion that is no vibration, over a span, and what becomes of disturbances of it."""
 
     def __init__(self, span: _Span, states: Array, matrix: Array) -> None:
-        self.span, self.states = span, states
+        self.span = span
+        self.states = states
         self.factors, vectors = np.linalg.eig(matrix * span.scales / span.scales[:, None])
         self.radius = float(np.abs(self.factors).max())
         self.to_modes = np.linalg.inv(vectors) / span.scales
@@ -88,7 +93,8 @@ class _Calm:
         vibration turns a little faster or slower.
         """
         begin, end = (self.to_modes @ (states[k] - self.states[k]) for k in (0, -1))
-        said, size = self.factors * begin, float(np.abs(end).sum())
+        said = self.factors * begin
+        size = float(np.abs(end).sum())
         off = float(np.abs(np.abs(end) - np.abs(said)).sum())
         turned = float(np.abs(end - said).sum())
         loss = (1.0 - self.radius) * size  # of the slowest modes, which are those at the end
@@ -108,7 +114,8 @@ def on_rough_pads(system: System, state: Array, calm: Sequence[Array], longest: 
     of what the waves force. The motion fades once it follows the linear equations of one of them. It lasts once
     it has kept its distance from all of them in a time twice as long. Unknown without any of them.
     """
-    span, known = _Span(system), list[_Calm]()
+    span = _Span(system)
+    known = list[_Calm]()
     for each in calm:
         flown = span(np.array(each, float), True)
         if flown is None:
@@ -117,7 +124,9 @@ def on_rough_pads(system: System, state: Array, calm: Sequence[Array], longest: 
             known.append(_Calm(span, *flown))
         except np.linalg.LinAlgError:  # disturbances that are alike
             return UNKNOWN
-    last, far, drawn = np.array(state, float), list[float](), 0
+    last = np.array(state, float)
+    far = list[float]()
+    drawn = 0
     spans = [SETTLING / (slowest_of_cycles(system.coefficients) * span.length)]
     spans += [NOTICED / -math.log(each.radius) for each in known if 0.0 < each.radius < 1.0]
     while known and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < longest:
@@ -141,7 +150,8 @@ def _falls(far: list[float]) -> bool:
     """Whether distances fall from span to span, by a line through the logarithms of the means of eighths."""
     means = [math.log(float(np.mean(part))) for part in np.array_split(far, min(len(far), 8))]
     places = np.arange(len(means)) - 0.5 * (len(means) - 1)
-    slope, square = float(places @ means / (places @ places)), float(places @ places)
+    slope = float(places @ means / (places @ places))
+    square = float(places @ places)
     rest = np.array(means) - np.mean(means) - slope * places
     error = math.sqrt(float(rest @ rest) / (len(means) - 2) / square)
     return slope < -max(DRIFTS * error, STILL / len(means))

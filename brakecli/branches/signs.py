@@ -31,7 +31,8 @@ ASIDE = 0.1
 """Part of a stride by which a point is moved from where Newton's method fails, or from the ends; a choice."""
 LEFT_OPEN = 0.6
 """Doubt of a straight line between two points, over their difference: a little more than half of it."""
-TRIES, SHORTER = 4, 0.25
+TRIES = 4
+SHORTER = 0.25
 """Strides from one side of a border that are tried, and each over the one before."""
 REAL = 1e-9
 """Imaginary part of a multiplier, over its size, that is rounding."""
@@ -75,7 +76,8 @@ def special_points(newton: Newton, points: list[Point], over: Over) -> tuple[lis
 def _between(newton: Newton, points: list[Point], specials: list[Special]) -> None:
     """Insert a point between two special points of one stride: what lies between may be stable on its own."""
     for k in range(len(points) - 2, -1, -1):
-        one, other = points[k], points[k + 1]
+        one = points[k]
+        other = points[k + 1]
         if not _one_piece(one, other):
             continue
         places = sorted(special.s for special in specials if one.s < special.s < other.s)
@@ -94,7 +96,8 @@ def _borders(newton: Newton, points: list[Point], over: Over) -> tuple[list[Spec
     specials: list[Special] = []
     k = 0
     while k < len(points) - 1:
-        one, other = points[k], points[k + 1]
+        one = points[k]
+        other = points[k + 1]
         if one.chart is other.chart and one.word != other.word:
             end = over()
             if end is not None:
@@ -109,7 +112,8 @@ def _borders(newton: Newton, points: list[Point], over: Over) -> tuple[list[Spec
             error = 0.5 * abs(far.p - near.p) + newton.settings.shortest * abs(float(near.tangent[-1]))
             name = newton.problem.border(near.word, far.word)
             turns = float(near.tangent[-1] * far.tangent[-1]) < 0.0
-            p, s = 0.5 * (near.p + far.p), 0.5 * (near.s + far.s)
+            p = 0.5 * (near.p + far.p)
+            s = 0.5 * (near.s + far.s)
             specials.append(Special("grazing", p, error, near, s, name, turns))
         k += 1
     return specials, ""
@@ -160,7 +164,8 @@ def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | Non
 
 def _insert(newton: Newton, points: list[Point], over: Over, margins: bool = False) -> str:
     """Insert points until no test, or no margin of the word, may vanish twice between two neighbours."""
-    settings, left = newton.settings, newton.settings.insertions
+    settings = newton.settings
+    left = newton.settings.insertions
     finished: set[tuple[int, int]] = set()  # pairs, by identity, that need no further look
     held = list(points)  # keeps every point alive, so that identities stay unique
     while True:
@@ -177,7 +182,8 @@ def _insert(newton: Newton, points: list[Point], over: Over, margins: bool = Fal
                 return end.reason
             if left <= 0:
                 return f"the budget of {settings.insertions} inserted points is spent"
-            one, other = points[k], points[k + 1]
+            one = points[k]
+            other = points[k + 1]
             newton.problem.use(one.chart)
             new = newton.between(one, other, part) or newton.between(one, other, 0.5)
             if new is None or (new.word != one.word and not margins):
@@ -211,13 +217,16 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     below it.
     """
     n = len(s)
-    first, last = tests[:-1], tests[1:]
+    first = tests[:-1]
+    last = tests[1:]
     apart = np.diff(s) > 0.0  # a corner may leave two points at one place
     same = apart[:, None] & ((first >= 0.0) == (last >= 0.0)) & (np.maximum(np.abs(first), np.abs(last)) > NOTHING)
     x = s[:-1, None] + np.diff(s)[:, None] * GRID  # (strides, places)
     size = min(n, 4)
     window = np.clip(np.arange(n - 1) - 1, 0, n - size)[:, None] + np.arange(size)
-    nodes, values = s[window], tests[window]  # (strides, size), (strides, size, tests)
+    # (strides, size), (strides, size, tests)
+    nodes = s[window]
+    values = tests[window]
     # Newton's divided differences
     levels = [values]
     for level in range(1, size):
@@ -243,7 +252,8 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     middle = np.argmin(inner, axis=1)[:, None]
     before, least, after = (np.take_along_axis(floor, middle + j, axis=1)[:, 0] for j in range(3))
     # the bottom of the parabola through the least value and its neighbours: a window may lie between two places
-    bend, slope = after - 2.0 * least + before, after - before
+    bend = after - 2.0 * least + before
+    slope = after - before
     curved = bend > np.abs(slope) / 2.0
     offset = np.where(curved, -0.5 * slope / np.where(curved, bend, 1.0), 0.0)
     least = least + 0.25 * slope * offset
@@ -279,7 +289,8 @@ def _changes(newton: Newton, one: Point, other: Point) -> list[Special]:
 
 
 def _differ(one: Point, other: Point, test: int) -> bool:
-    a, b = one.tests[test], other.tests[test]
+    a = one.tests[test]
+    b = other.tests[test]
     return (a >= 0.0) != (b >= 0.0) and max(abs(a), abs(b)) > NOTHING and not (math.isnan(a) or math.isnan(b))
 
 
@@ -296,8 +307,11 @@ def _saddle(point: Point) -> bool:
 
 def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable[[Point], float]) -> Special:
     """Locate a zero between two neighbours by the Illinois method, with Newton's method at each place."""
-    low, high = test(one), test(other)
-    best, error, side = one, abs(other.p - one.p), 0
+    low = test(one)
+    high = test(other)
+    best = one
+    error = abs(other.p - one.p)
+    side = 0
     for _ in range(MOST_STEPS):
         part = zero(low, high, AT_END)
         # Newton's method fails very near a branch point: then a little before it, or behind it
@@ -307,17 +321,21 @@ def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable
                 break
         if new is None or new.word != one.word:
             break
-        error, moved = abs(new.p - best.p), abs(new.s - best.s)
-        best, value = new, test(new)
+        error = abs(new.p - best.p)
+        moved = abs(new.s - best.s)
+        best = new
+        value = test(new)
         # at a fold p hardly moves, so the place itself must stand still as well
         if value == 0.0 or math.isnan(value) or (error < SOUGHT and moved < STILL):
             break
         if (value >= 0.0) == (low >= 0.0):
-            one, low = new, value
+            one = new
+            low = value
             high *= 0.5 if side == 1 else 1.0  # an end that stays twice would slow the secant down
             side = 1
         else:
-            other, high = new, value
+            other = new
+            high = value
             low *= 0.5 if side == -1 else 1.0
             side = -1
     return Special(kind, best.p, max(error, ROUNDING), best, best.s, "", kind == "fold")

@@ -85,7 +85,8 @@ class Sliding:
 
     def _at(self, p: float) -> Slide:
         """Steady sliding at a place."""
-        nothing, line = Slide(p, None, None, None, (math.nan, math.nan)), self.line
+        nothing = Slide(p, None, None, None, (math.nan, math.nan))
+        line = self.line
         try:
             if line.smooth:
                 c, stiffness, belt, load = shoe = line.shoe(p)
@@ -93,15 +94,19 @@ class Sliding:
             else:
                 system = line.system(p)
                 found = steady_sliding(system, mean=tabulated(system))
-                c, stiffness, belt = system.coefficients, found.stiffness, system.belt_speed
-                rest, pressed = (found.x, found.y), found.is_pressed(system.load_at_start)
+                c = system.coefficients
+                stiffness = found.stiffness
+                belt = system.belt_speed
+                rest = (found.x, found.y)
+                pressed = found.is_pressed(system.load_at_start)
         except CaseError:
             return nothing
         locks = line.smooth and rest is None
         if belt == 0.0 or not (pressed or locks):
             return nothing
         grip = c.grip(belt)
-        b, links = (c.b_xx, c.b_xy, c.b_yy), (c.c_xx, c.c_xy, c.c_yy)
+        b = (c.b_xx, c.b_xy, c.b_yy)
+        links = (c.c_xx, c.c_xy, c.c_yy)
         determinant, apart = routh_hurwitz(c.m, b, links, stiffness, grip, damped=not is_undamped(c))
         if locks:  # beyond divergence there is no steady sliding, and the determinant says where it ended
             return replace(nothing, tests=(min(float(determinant), -sys.float_info.min), math.nan))
@@ -127,17 +132,23 @@ class Sliding:
         def height(p: float) -> float:
             return sign * self.at(p).tests[test]
 
-        a, b = left + GOLDEN * (right - left), right - GOLDEN * (right - left)
-        at_a, at_b = height(a), height(b)
+        a = left + GOLDEN * (right - left)
+        b = right - GOLDEN * (right - left)
+        at_a = height(a)
+        at_b = height(b)
         for _ in range(SEARCHES):
             if min(at_a, at_b) < 0.0:
                 break
             if at_a < at_b:
-                right, b, at_b = b, a, at_a
+                right = b
+                b = a
+                at_b = at_a
                 a = left + GOLDEN * (right - left)
                 at_a = height(a)
             else:
-                left, a, at_a = a, b, at_b
+                left = a
+                a = b
+                at_a = at_b
                 b = right - GOLDEN * (right - left)
                 at_b = height(b)
         return self.at(a if at_a < at_b else b)
@@ -179,21 +190,25 @@ class Sliding:
         Where a rough shoe touches in part they are born there, and a small one is taken. The tangent of the point
         leads to larger ones.
         """
-        slide, belt = self.at(change.p), self.line.shoe(change.p).belt
+        slide = self.at(change.p)
+        belt = self.line.shoe(change.p).belt
         if slide.eigenvalues is None or slide.vectors is None or slide.rest is None:
             return None
         which = int(np.argmin(np.abs(slide.eigenvalues - 2j * math.pi * change.frequency)))
-        omega, shape = float(slide.eigenvalues[which].imag), slide.vectors[:, which]
+        omega = float(slide.eigenvalues[which].imag)
+        shape = slide.vectors[:, which]
         turning = np.exp(2j * math.pi * np.arange(PHASES) / PHASES)
         w = (np.concatenate([shape, 1j * omega * shape])[:, None] * turning).real
         ahead = w[2] * math.copysign(1.0, belt)
-        stick, flight = abs(belt) / ahead.max(), self._rises(change.p, slide.rest[1]) / w[1].max()
+        stick = abs(belt) / ahead.max()
+        flight = self._rises(change.p, slide.rest[1]) / w[1].max()
         size = BELOW_GRAZING * min(stick, flight)
         touch = int(np.argmax(ahead if stick < flight else w[1]))
         mode = size * w[:, (touch + PHASES // 2) % PHASES]  # far from where it will graze
         length = size * float(np.abs(w[:2]).max())
         scales = length * np.array([1.0, 1.0, omega, omega])
-        u, time = np.append(mode / scales, 1.0), 2.0 * math.pi / omega
+        u = np.append(mode / scales, 1.0)
+        time = 2.0 * math.pi / omega
         chart = cycles.chart_at(u, change.p, scales, time, 0.5 * size * float(np.ptp(w[0])))
         if chart is None:
             return None

@@ -60,7 +60,8 @@ def _turns(followed: Followed, places: list[int], way: int) -> list[Bound]:
 
 def _bound(followed: Followed, k: int, way: int) -> Bound:
     """Where the stable part ends whose last point that way is the one at k."""
-    branch, problem = followed.branch, followed.problem
+    branch = followed.branch
+    problem = followed.problem
     assert branch is not None
     point = branch.points[k]
     if not 0 <= k + way < len(branch.points):

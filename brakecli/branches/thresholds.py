@@ -70,7 +70,8 @@ def thresholds(
         return _told(found, "no dashpot damps the shoe, so that no vibration is followed below that")
     if not system.steady:
         return _told(found, "speed or load change, so that no vibration is followed below that")
-    own, highest = report.friction, UP_TO * lost.friction
+    own = report.friction
+    highest = UP_TO * lost.friction
     if report.stable:
         highest = max(highest, BEYOND * own)
     explorer = Explorer(Line(case, [FRICTION], 0.0, highest), tell, lambda: False, points=POINTS)
@@ -92,7 +93,8 @@ def _told(found: Thresholds, why: str) -> Thresholds:
 
 def _beside(answers: Answers, critical: float) -> str:
     """What vibrates beside stable sliding."""
-    line, coexisting = answers.line, answers.coexisting
+    line = answers.line
+    coexisting = answers.coexisting
     further = {"budget": "; `brakecli branch` follows it further"}
     cut = [
         f"the branch is cut at {mark.value:.4g}: {mark.reason}{further.get(mark.kind, '')}"

@@ -12,7 +12,9 @@ from brakecli.branches.point import Branch, End, Point, Special
 from brakecli.branches.sliding import Change, Slide
 from brakecli.solver.tangent import MOST_POWERS
 
-SLIDING, LIMIT_CYCLE, FORCED = "steady sliding", "limit cycle", "forced motion"
+SLIDING = "steady sliding"
+LIMIT_CYCLE = "limit cycle"
+FORCED = "forced motion"
 IN_SLIDING = "it ends in steady sliding, where that flutters"
 BESIDE = 1e-5
 """Length along a branch from its begin, within which a special point is that begin."""
@@ -62,7 +64,8 @@ class Followed:
 
 def slid(line: Line, slides: list[Slide], changes: list[Change]) -> Followed:
     """Steady sliding: its multipliers are those of a period of its least stable mode, or of a second."""
-    rows, marks = [], []
+    rows = []
+    marks = []
     there = [slide for slide in slides if slide.eigenvalues is not None]
     for slide in there:
         assert slide.eigenvalues is not None
@@ -91,7 +94,8 @@ def told_of(
     changes: Sequence[Change] = (),
 ) -> Followed:
     """A branch as rows and marks; of the linear vibrations at its flutter only the largest one is kept."""
-    points, specials = branch.points, branch.specials
+    points = branch.points
+    specials = branch.specials
     marks = []
     if change is not None:
         first = 0
@@ -129,7 +133,8 @@ def _mark(line: Line, special: Special, ended: Sequence[End] = ()) -> Mark:
     if kind.startswith("sequence"):
         kind = "grazing stick"
     cut = [end for end in ended if end.reason == special.name and end.kind in ("points", "seconds", "interrupted")]
-    facts, width = special.point.facts, abs(line.high - line.low)
+    facts = special.point.facts
+    width = abs(line.high - line.low)
     return Mark(
         "budget" if special.kind == "end" and cut else kind,
         line.value(special.p),

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 
 PROFILE_ERROR = 0.01
 """Part of the RMS of a measured profile that its sines leave out, where a case leaves it open."""
-SAMPLES_PER_CYCLE, SAMPLES_PER_WAVE = 50.0, 10.0
+SAMPLES_PER_CYCLE = 50.0
+SAMPLES_PER_WAVE = 10.0
 """Samples in a period of the fastest motion, and of the shortest wave that passes, where a case leaves it open."""
 
 
@@ -75,7 +76,8 @@ class Case(Table):
             pad = self.contact.half_length if side == "shoe" else None
             error = PROFILE_ERROR if given.profile_error is None else given.profile_error
             try:
-                path, record = Path(given.profile), record_of(given.profile)
+                path = Path(given.profile)
+                record = record_of(given.profile)
                 sines = dict(type(given)(**sines_of(path.name, record, error, self.wheel.radius, pad)))
                 written = {"profile": str(path.absolute()), "profile_error": given.profile_error}
                 surface = given.model_construct(given.model_fields_set, **sines | written)
@@ -102,8 +104,12 @@ class Case(Table):
     def _broken_rules(self) -> Iterator[Problem]:
         yield from self._put_sines()
         yield from self._put_start()
-        solver, step, evaluator = self.solver, self.solver.step, self.contact.evaluator
-        own_steps, exact, start = solver.row.own_steps, solver.row.exact, self.initial
+        solver = self.solver
+        step = self.solver.step
+        evaluator = self.contact.evaluator
+        own_steps = solver.row.own_steps
+        exact = solver.row.exact
+        start = self.initial
         rough = [name for name, profile in self.roughness if profile and profile.is_rough]
         values = {"wheel.angular_speeds": self.wheel.angular_speeds, "load.forces": self.load.forces}
         changing = [key for key, each in values.items() if len({*(each or ())}) > 1]
@@ -148,14 +154,16 @@ class Case(Table):
         )
         if step is None and "sample_interval" not in self.output.model_fields_set:
             # as one that is not given: it follows the case, also where that is changed
-            given, found = self.output.model_fields_set, {"sample_interval": self._interval()}
+            given = self.output.model_fields_set
+            found = {"sample_interval": self._interval()}
             self.__dict__["output"] = Output.model_construct(given, **self.output.model_dump() | found)
 
     def _interval(self) -> float:
         """Between samples (s), to two digits, by the fastest motion and the shortest wave that passes."""
         from brakecli.solver.links import natural_frequencies
 
-        wheel, (_, fastest) = self.wheel, natural_frequencies(self.coefficients, self.contact_stiffness)
+        wheel = self.wheel
+        _, fastest = natural_frequencies(self.coefficients, self.contact_stiffness)
         turns = [0.0] if self.roughness.wheel is None else surface_of(self.roughness.wheel, wheel.radius).turns
         speed = wheel.radius * max(map(abs, wheel.angular_speeds or (wheel.angular_speed or 0.0,)))
         rate = max(SAMPLES_PER_CYCLE * fastest, SAMPLES_PER_WAVE * speed * float(max(turns, default=0.0)))

@@ -16,7 +16,8 @@ from brakecli.solver.schemes import SCHEMES, Scheme
 DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
 SETTLED: Literal["settled"] = "settled"
 """In place of a duration: the run goes on until its verdict is decided."""
-BUDGET, MOST_BUDGET = 100_000_000, 10**15
+BUDGET = 100_000_000
+MOST_BUDGET = 10**15
 """Steps that a case may take in all until its verdict is decided, where it leaves that open, and the most.
 
 A choice: at 7 million given steps in a second, a quarter of a minute. A step on rough pads may take a hundred
@@ -195,7 +196,8 @@ class Solver(Table):
         if self.budget is not None and getattr(self, "duration", SETTLED) != SETTLED:
             what = f'is for duration = "{SETTLED}", but duration is a number'
             yield self.wrong("budget", what, f'leave budget out, or set duration to "{SETTLED}"')
-        row, count = self.row, len(self.row.theta)
+        row = self.row
+        count = len(self.row.theta)
         if row.own_steps:
             for key, neutral in (("theta", ()), ("iteration", "newton"), ("allow_unconverged", False)):
                 if getattr(self, key) != neutral:

@@ -17,7 +17,9 @@ _GAP = 4.0  # median steps between two places from which on nothing was measured
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
 _SEEN = 0.01  # per cent by which a record is stretched unsaid
 _NEAREST = 1e-9  # m; nothing is measured at places nearer to each other
-_FARTHEST, _FLATTEST = 1e9, 1e-15  # m; no wheel is larger, and no height less
+# m; no wheel is larger, and no height less
+_FARTHEST = 1e9
+_FLATTEST = 1e-15
 _MOST_PLACES = 10  # of the even grid for each that was measured
 _FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
 
@@ -29,9 +31,11 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
     wheel, of which whole turns are averaged. Otherwise the profile is repeated beyond what was measured. Raises
     UnreadableResultError and UsageError.
     """
-    place, height = np.frombuffer(record.place), np.frombuffer(record.height)
+    place = np.frombuffer(record.place)
+    height = np.frombuffer(record.height)
     place = place * radius if record.is_angle else place
-    turn, step = 2.0 * math.pi * radius, float(np.median(np.diff(place)))
+    turn = 2.0 * math.pi * radius
+    step = float(np.median(np.diff(place)))
     apart = f"its places lie {step:.3g} m apart, as a rule"
     require(step >= _NEAREST, f"{apart}; check their unit")
     far = float(place[-1] - place[0])
@@ -83,7 +87,8 @@ def read(path: Path) -> Record:
     lines = [line for line in table.header if line.strip()]
     unnamed = "its first lines do not name both columns; separate names and numbers alike, or remove these lines"
     require(table.names or not lines, unnamed)
-    along, up = table.unit(0, "meter", "radian"), table.unit(1, "meter")
+    along = table.unit(0, "meter", "radian")
+    up = table.unit(1, "meter")
     angles = ("angle", "theta", "phi", "θ", "φ")
     bare = along is None and table.names and any(word in table.names[0].lower() for word in angles)
     require(not bare, f"column {table.names[0] if bare else ''}: has no unit; name it angle_deg or angle_rad")
@@ -121,7 +126,8 @@ def _checked(place: Array, height: Array, *, is_angle: bool) -> Record:
     for what, largest in (("place", np.abs(place).max()), ("height", np.abs(height).max())):
         require(largest <= _FARTHEST, f"a {what} is {largest:.3g} in SI units; check the unit")
     if place[-1] < place[0]:
-        place, height = place[::-1], height[::-1]
+        place = place[::-1]
+        height = height[::-1]
     steps = np.diff(place)
     row = int(np.argmin(steps > 0.0)) + 2
     back = f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"

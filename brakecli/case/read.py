@@ -117,7 +117,8 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
         loaded = parse_case(text, label, overrides)
     except CaseError as error:
         raise CaseError([*map(explained, error.problems)]) from None
-    before, wheel = stored.case.wheel.radius, stored.case.roughness.wheel
+    before = stored.case.wheel.radius
+    wheel = stored.case.roughness.wheel
     if wheel and wheel.note and loaded.case.wheel.radius != before and loaded.case.roughness.wheel == wheel:
         raise CaseError(
             [
@@ -134,13 +135,17 @@ def parse_resolved(text: str, label: str, overrides: Sequence[str] = ()) -> Load
 
 def parse_table(kind: type[_Table], text: str, label: str, overrides: Sequence[str] = ()) -> _Table:
     """Make a table of some kind, such as a case, of a whole TOML text; see `parse_case`."""
-    located, problems = Located(text, label), list[Problem]()
+    located = Located(text, label)
+    problems = list[Problem]()
     try:
         data = parse(text, label)
     except CaseError as error:
-        data, problems = located.data, located.problems or [*error.problems]
-    all_is_readable, twice = all(problem.path for problem in problems), {problem.path for problem in problems}
-    sources, set_by = [label], dict[KeyPath, str]()
+        data = located.data
+        problems = located.problems or [*error.problems]
+    all_is_readable = all(problem.path for problem in problems)
+    twice = {problem.path for problem in problems}
+    sources = [label]
+    set_by = dict[KeyPath, str]()
     roughness = data.get("roughness")
     for surface in roughness.values() if isinstance(roughness, dict) else ():
         if isinstance(surface, dict) and isinstance(profile := surface.get("profile"), str) and profile:
@@ -177,7 +182,8 @@ def parse_over_case(
     Overrides of its `own` keys belong to the file, all others to its case. Raises `CaseError`.
     """
     for_file = [each for each in overrides if (*key_path(each.partition("=")[0]), "")[0] in own]
-    table, lines = parse_table(kind, text, name, for_file), Located(text, name).lines
+    table = parse_table(kind, text, name, for_file)
+    lines = Located(text, name).lines
     try:
         case_text, source = read_text(str(folder / table.case))
     except CaseError as error:

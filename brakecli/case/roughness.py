@@ -144,7 +144,8 @@ class Profile(Table):
         yield from super()._broken_rules()
         for key in ("phases_deg", "wavelengths", "wavenumbers"):
             yield from self.different_lengths(key, "amplitudes")
-        phases, terms = self.phases_deg, self.spectrum.terms if self.spectrum else 0
+        phases = self.phases_deg
+        terms = self.spectrum.terms if self.spectrum else 0
         needless = self.profile is None and self.profile_error is not None
         one_each = "give one value for each term, or leave phases_deg out"
         what = f"has {tables.entries(phases or ())}, but spectrum.terms is {terms}"

@@ -15,14 +15,18 @@ _SMOOTH = surface()
 _shared = lru_cache(maxsize=4096)(schedule)
 """Schedules that the points of a sweep have in common; nobody changes them, nor surfaces."""
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
-FIRST_CYCLES, FIRST_SAMPLES = 250.0, 500_000.0
+FIRST_CYCLES = 250.0
+FIRST_SAMPLES = 500_000.0
 """Periods of the slowest mode in the first run of a case that is to settle, and its samples at most. A window of
 its envelope, a fortieth of it, then holds six of them."""
 
 
 def system_of(case: Case) -> System:
     """The system of a case, with the method that the case asks for."""
-    wheel, load, initial, solver = case.wheel, case.load, case.initial, case.solver
+    wheel = case.wheel
+    load = case.load
+    initial = case.initial
+    solver = case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
         surface_of(each, wheel.radius) if each is not None else _SMOOTH

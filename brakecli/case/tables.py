@@ -24,7 +24,9 @@ from brakecli.errors import KeyPath, Problem, found
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.schemes import SCHEMES
 
-SMALLEST, LARGEST = 1e-100, 1e100  # magnitudes of all numbers but 0, so that products neither vanish nor overflow
+# magnitudes of all numbers but 0, so that products neither vanish nor overflow
+SMALLEST = 1e-100
+LARGEST = 1e100
 ROUNDED = 1e-9  # relative difference of two numbers of a file that are the same
 MOST_WRONG_ENTRIES = 20  # of one list that are reported
 MOST_SINES = 2000  # of a surface that is not given as sines: a resolved case must not be larger than a case may be
@@ -131,7 +133,8 @@ class Table(BaseModel):
 
     def different_lengths(self, key: str, other: str) -> Iterator[Problem]:
         """Yield a problem if a list is not as long as another one; either may be absent."""
-        values, others = getattr(self, key), getattr(self, other)
+        values = getattr(self, key)
+        others = getattr(self, other)
         if None not in (values, others) and len(values) != len(others):
             yield self.wrong(
                 key,

@@ -26,7 +26,9 @@ _WHAT = {
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
 }
 """The kinds of error that pydantic reports for one value of a case."""
-_LIKE, _LIKE_HERE = 0.7, 0.65  # least likeness of a misspelt key; in its own table less is enough: nmu for num
+# least likeness of a misspelt key; in its own table less is enough: nmu for num
+_LIKE = 0.7
+_LIKE_HERE = 0.65
 _TEXT = "one line of text in quotes"
 _KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
@@ -38,7 +40,9 @@ def problems(error: ValidationError, kind: type[Table], where: str = "at the top
     meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
     misspelt = [paths[0] for paths in meant.values() if paths]
     for each in errors:
-        path, value, reason = each["loc"], each["input"], each["type"]
+        path = each["loc"]
+        value = each["input"]
+        reason = each["type"]
         if reason == "rule":
             problem = replace(each["ctx"]["problem"], path=path)
             if problem.what != MISSING or not any(_may_be(problem, near) for near in misspelt):
@@ -76,7 +80,8 @@ def problems(error: ValidationError, kind: type[Table], where: str = "at the top
 
 def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
     """The key paths that an unknown one was probably meant to be; empty if none comes near."""
-    parent, key = _table(path), str(path[-1])
+    parent = _table(path)
+    key = str(path[-1])
     known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
     if key not in known:
         if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=_LIKE_HERE):

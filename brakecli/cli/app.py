@@ -65,12 +65,15 @@ def main() -> None:
     try:
         app()
     except BrakecliError as error:
-        message, code = str(error), error.exit_code
+        message = str(error)
+        code = error.exit_code
     except MemoryError:
-        message, code = "out of memory; reduce contact.nodes, or sample less often", 3
+        message = "out of memory; reduce contact.nodes, or sample less often"
+        code = 3
     except OSError as error:  # not of an input or output, but of a file such as the cache of compiled code
         what = f"{error.filename or 'a file'}: cannot be read or written: {error.strerror or error}"
-        message, code = f"{what}; check its path and permissions", 74
+        message = f"{what}; check its path and permissions"
+        code = 74
     except SystemExit as end:
         if end.code == 2:  # bad usage, which is reported already
             files = [word for word in sys.argv[1:] if word[1:] and word[0] == "-" and os.path.isfile(word)]  # noqa: PTH113

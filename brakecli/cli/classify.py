@@ -32,14 +32,16 @@ def command(
     if len(sources) == 1:
         from brakecli.front.tables import verdict_table
 
-        source, numbers = sources[0], verdict_on(sources[0], measured, thresholds)
+        source = sources[0]
+        numbers = verdict_on(sources[0], measured, thresholds)
         warn(*numbers.get("warnings", ()))
         shown = {"source": source, **numbers}
         show_result("classify", shown, verdict_table, source, numbers, as_json=as_json, quiet=quiet)
         return
     from brakecli.front.tables import verdicts_table
 
-    results, failures = [], []
+    results = []
+    failures = []
     for source in sources:  # one that cannot be read does not keep the others from being judged
         try:
             results.append({"source": source, **verdict_on(source, measured, thresholds)})

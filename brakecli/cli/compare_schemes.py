@@ -36,7 +36,8 @@ def command(
     from brakecli.front.tables import comparison_table
     from brakecli.runs.run import load_kernels
 
-    chosen, ladder = parse_schemes(schemes), parse_steps(steps)
+    chosen = parse_schemes(schemes)
+    ladder = parse_steps(steps)
     system = load_kernels(loaded)
     with telling(quiet) as show_progress:
         with new_result(target, force=force):  # whether it can be written is known before anything is computed

@@ -36,8 +36,11 @@ def command(
         raise UsageError("the name is empty; give one, or leave it out for case.toml")
     path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
     starter = name.removesuffix(".toml")
-    text, near = texts.get(starter, texts["case"]), get_close_matches(starter, texts, n=1, cutoff=0.7)
-    written, base = {path: text}, text.partition('\ncase = "')[2].partition('"')[0]  # a sweep or a study has one
+    text = texts.get(starter, texts["case"])
+    near = get_close_matches(starter, texts, n=1, cutoff=0.7)
+    # a sweep or a study has one
+    written = {path: text}
+    base = text.partition('\ncase = "')[2].partition('"')[0]
     if base and not (path.parent / base).exists():
         written[path.parent / base] = texts[base.removesuffix(".toml")]
     for place, content in written.items():

@@ -59,7 +59,9 @@ def command(
     with telling(quiet) as show_progress, within_range():
         if (text := sliding_text(system := system_of(loaded.case))) and not quiet:
             say(text)
-        report, found, both = stability(system), None, None
+        report = stability(system)
+        found = None
+        both = None
         if not axis:
             both = thresholds(loaded.case, system, report, show_progress, pushes)
         else:

@@ -24,16 +24,26 @@ from brakecli.solver.schemes import load
 from brakecli.solver.system import System
 
 BUDGET = 60.0  # s
-REFERENCE, CHECK = 1e-12, 1e-10  # tolerances of the reference, and of the run that shows how good it is
+# tolerances of the reference, and of the run that shows how good it is
+REFERENCE = 1e-12
+CHECK = 1e-10
 REFERENCE_SHARE = 0.3  # part of the budget that the reference may take
 FEWEST_SAMPLES = 64
 LONGER = 3.0  # times a part of the motion, which the budget must allow for a longer one to be computed
-AIM, MOST_LONGER = 0.7, 4.0  # part of the budget that it is to take, and times the part before, at most
+# part of the budget that it is to take, and times the part before, at most
+AIM = 0.7
+MOST_LONGER = 4.0
 ERRORS_SHARE = 0.8  # part of the budget after which no further error is measured: the rest is for times
-SPREAD, BESIDE = 1.3, 0.005  # time of a turn over the last one, and s for each run beside its loop
+# time of a turn over the last one, and s for each run beside its loop
+SPREAD = 1.3
+BESIDE = 0.005
 ROUNDING = 1e-9  # of the largest velocity: a line below that is rounding
-MOTION, FORCES = ("x", "y", "vx", "vy"), ("friction_force", "normal_force")  # what is compared
-MOST_REPEATS, SLOW_REPEATS = 21, 3  # turns of most loops, and of slow ones: there, chance matters less
+# what is compared
+MOTION = ("x", "y", "vx", "vy")
+FORCES = ("friction_force", "normal_force")
+# turns of most loops, and of slow ones: there, chance matters less
+MOST_REPEATS = 21
+SLOW_REPEATS = 3
 SLOW = 0.1  # s, of a loop
 LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
 LEFT_OUT = "left out: no time within the budget"
@@ -116,7 +126,8 @@ class Comparison:
 
     def finer_error(self, entry: Entry) -> float:
         """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
-        kind, step = entry.kind, entry.method.step or 0.0
+        kind = entry.kind
+        step = entry.method.step or 0.0
         finer = (each for each in self.entries if each.kind == kind and (each.method.step or step) < step)
         return max((each.error for each in finer if each.errors), default=0.0)
 
@@ -131,7 +142,8 @@ def compare(
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
     with within_range():
-        found, entries = ladder(system, steps), list[Entry]()
+        found = ladder(system, steps)
+        entries = list[Entry]()
         for kind in kinds(system, schemes):  # compilation is not part of the budget
             _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
             label = method_label(kind)
@@ -149,7 +161,9 @@ def compare(
         repeats = _repeat(sampled, entries, begin + budget, progress)
     _mark_front(entries)
     left_out = sum(entry.failure == LEFT_OUT for entry in entries)
-    duration, interval, seconds = sampled.duration, sampled.interval, reference.work.solve_seconds
+    duration = sampled.duration
+    interval = sampled.interval
+    seconds = reference.work.solve_seconds
     return Comparison(duration, interval, reference_error, seconds, repeats, left_out, tuple(entries))
 
 
@@ -171,7 +185,8 @@ def _event_driven(system: System, tolerance: float, without: str) -> Motion:
 def _reference(system: System, budget: float) -> Motion:
     """The longest part of the motion whose reference fits the budget (s), from the start on."""
     shortest = FEWEST_SAMPLES * system.interval
-    part, whole = replace(system, duration=shortest), max(system.duration, shortest)
+    part = replace(system, duration=shortest)
+    whole = max(system.duration, shortest)
     while True:
         motion = _event_driven(part, REFERENCE, "there is no reference to compare with")
         seconds = motion.work.solve_seconds
@@ -196,7 +211,8 @@ def _measure(system: System, entries: list[Entry], reference: Floats, deadline: 
             entry.failure = " ".join(str(error).split())
             continue
         work = entry.work = motion.work
-        last[entry.kind], entry.failure = work.solve_seconds, work.failure_sentence or ""
+        last[entry.kind] = work.solve_seconds
+        entry.failure = work.failure_sentence or ""
         entry.iterations = work.contact_evaluations - len(motion.rows) if entry.method.step else 0
         if not work.failed:
             entry.seconds.append(work.solve_seconds)
@@ -223,7 +239,8 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Cou
 
 def _add_limits(system: System, report: linear.StabilityReport, entries: list[Entry]) -> None:
     """Add what the amplification matrices say, and the observed orders."""
-    stiffness_at, exact = report.stiffness_at, report.critical
+    stiffness_at = report.stiffness_at
+    exact = report.critical
     # Neither depends on starts, iterations and evaluators
     limit = cache(lambda scheme: linear.step_limit(replace(system, method=scheme), stiffness_at))
 
@@ -234,14 +251,18 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
         return found - exact.friction if found is not None and exact else None
 
     for entry in entries:
-        scheme, step = Method(entry.kind.scheme, entry.kind.theta), entry.method.step
+        scheme = Method(entry.kind.scheme, entry.kind.theta)
+        step = entry.method.step
         if step is None:
-            entry.step_limit, entry.critical_bias = math.inf, 0.0 if exact else None
+            entry.step_limit = math.inf
+            entry.critical_bias = 0.0 if exact else None
         elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
             found = limit(scheme)
-            entry.step_limit, entry.critical_bias = math.inf if found is None else found, bias(scheme, step)
+            entry.step_limit = math.inf if found is None else found
+            entry.critical_bias = bias(scheme, step)
     for coarse, fine in pairwise(entries):
-        long, short = coarse.method.step, fine.method.step
+        long = coarse.method.step
+        short = fine.method.step
         if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
             fine.order = math.log(coarse.error / fine.error) / math.log(long / short)
 
@@ -251,17 +272,21 @@ def _mark_front(entries: list[Entry]) -> None:
     best = math.inf
     for entry in sorted(entries, key=lambda each: (each.wall_seconds or 0.0, each.error)):
         if entry.error < best:
-            entry.on_front, best = True, entry.error
+            entry.on_front = True
+            best = entry.error
 
 
 def errors(rows: Floats, reference: Floats) -> Errors:
     """Compare rows of `quantities.HISTORY`, sampled at the same times."""
     columns = {name: pair for name, *pair in zip(HISTORY, rows.T, reference.T, strict=True)}
-    largest, mean = {}, {}
+    largest = {}
+    mean = {}
     for name in (*MOTION, *FORCES):
         values, exact = columns[name]
-        apart, scale = np.abs(values - exact), float(np.abs(exact).max()) or 1.0
-        largest[name], mean[name] = float(apart.max()) / scale, float(apart.mean()) / scale
+        apart = np.abs(values - exact)
+        scale = float(np.abs(exact).max()) or 1.0
+        largest[name] = float(apart.max()) / scale
+        mean[name] = float(apart.mean()) / scale
     return Errors(max(largest[name] for name in MOTION), largest, mean, *_line(*columns["vx"]))
 
 
@@ -277,5 +302,6 @@ def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None
     if top < FEWEST_BINS or size[top] <= ROUNDING * count * float(np.abs(reference).max()):
         return None, None
     turning = np.exp(-2j * math.pi * top / count * np.arange(count)) * window
-    exact, found = complex(turning @ late), complex(turning @ (values[-count:] - values[-count:].mean()))
+    exact = complex(turning @ late)
+    found = complex(turning @ (values[-count:] - values[-count:].mean()))
     return abs(found) / abs(exact) - 1.0, float(np.angle(found / exact))

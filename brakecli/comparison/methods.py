@@ -13,7 +13,9 @@ from brakecli.solver.method import Method
 from brakecli.solver.schemes import SCHEMES
 from brakecli.solver.system import WHOLE, System
 
-COARSEST, RUNGS = 16, 7  # steps per period of the fastest motion that a ladder begins with; steps on it
+# steps per period of the fastest motion that a ladder begins with; steps on it
+COARSEST = 16
+RUNGS = 7
 TOLERANCES: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 ON_NODES: tuple[float, ...] = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 NODE_FACTORS: tuple[float, ...] = (0.25, 0.5, 2.0, 4.0)

@@ -34,7 +34,8 @@ class ComparisonReport:
     @property
     def recommended(self) -> Entry | None:
         """The entry that takes the least time of those that meet the target, the reference's error added."""
-        timed, added = [each for each in self.comparison.entries if each.seconds], self.comparison.reference_error
+        timed = [each for each in self.comparison.entries if each.seconds]
+        added = self.comparison.reference_error
         able = [each for each in timed if each.error + added <= self.target]
         return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
 
@@ -58,7 +59,8 @@ class ComparisonReport:
 
 def write(path: Path, loaded: LoadedCase, report: ComparisonReport, *, force: bool) -> None:
     """Write the result file; raises UsageError or CannotWriteError."""
-    numbers, entries = report.numbers(), report.comparison.entries
+    numbers = report.numbers()
+    entries = report.comparison.entries
     place = next((place for place, entry in enumerate(entries) if entry is report.recommended), None)
     with new_result(path, force=force) as result:
         result.set_attributes(origin("comparison", report.title, loaded))

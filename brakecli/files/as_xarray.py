@@ -84,7 +84,8 @@ def _check(result: StoredResult, *, own: bool) -> None:
 
 def dataset(declared: Iterable[Field], numbers: Mapping[str, Any]) -> xr.Dataset:
     """Numbers and texts as variables with their units; lists as attributes, and objects, as JSON."""
-    found, known = xr.Dataset(), {field.name: field for field in declared}
+    found = xr.Dataset()
+    known = {field.name: field for field in declared}
     for name, value in numbers.items():
         field = known.get(name)
         if isinstance(value, list | tuple | dict):

@@ -37,7 +37,8 @@ class OutputFile(FileIO):
         """Begin with an empty file, in the place of one that a killed process left."""
         self.path = path
         self.failure: OSError | None = None
-        self._target, self._force = target, force
+        self._target = target
+        self._force = force
         self._temporary = target.with_name(f".{target.name}.part")
         super().__init__(self._temporary, "w+", opener=open_own)
 
@@ -127,7 +128,8 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     `force` is not set or where another process is writing it. A symbolic link is followed.
     """
     target = _checked_target(path, force=force)
-    lock, clean_up = target.with_name(f".{target.name}.lock"), ExitStack()
+    lock = target.with_name(f".{target.name}.lock")
+    clean_up = ExitStack()
 
     def leave_nothing() -> str:
         clean_up.close()

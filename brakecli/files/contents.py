@@ -205,7 +205,9 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
         shapes = [list(each[name].shape) if name in each else [] for each in known]
         compared = different = 0
         largest = highest = 0.0
-        coded, numeric, along = any("flag_meanings" in each.attributes for each in held), True, None
+        coded = any("flag_meanings" in each.attributes for each in held)
+        numeric = True
+        along = None
         if all(shapes) and shapes[0][1:] == shapes[1][1:]:
             along = _other_places(a, b, group, held)
             for one, other in (_pairs if along is None else _interpolated)(a, b, group, name, along or ""):
@@ -216,8 +218,10 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
                     off = np.where(there, np.abs(1.0 * one - other), 0.0)
                     sizes = [float(np.abs(each[there]).max(initial=0.0)) for each in (one, other)]
                     apart &= ~there | (off > (_ROUNDING * max(sizes) if along else 0.0))
-                    largest, highest = max(largest, float(off.max(initial=0.0))), max(highest, *sizes)
-                compared, different = compared + one.size, different + int(apart.sum())
+                    largest = max(largest, float(off.max(initial=0.0)))
+                    highest = max(highest, *sizes)
+                compared = compared + one.size
+                different = different + int(apart.sum())
         if different or shapes[0] != shapes[1]:
             yield {
                 "group": group,
@@ -256,7 +260,8 @@ def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis:
         return bisect_left(rows, place, key=lambda row: float(result.read(group, axis, row, row + 1)[0]))
 
     ends = [[float(result.read(group, axis, *at)[0]) for at in ((0, 1), (-1, None))] for result in (a, b)]
-    first, last = max(low for low, _ in ends), min(high for _, high in ends)
+    first = max(low for low, _ in ends)
+    last = min(high for _, high in ends)
     parts = [range(row(result, first), row(result, math.nextafter(last, math.inf))) for result in (a, b)]
     swapped = len(parts[1]) < len(parts[0])
     one, other, part = (b, a, parts[1]) if swapped else (a, b, parts[0])
@@ -266,7 +271,8 @@ def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis:
         near = max(row(other, at[0]) - 1, 0), row(other, at[-1]) + 1
         places, there = (other.read(group, each, *near) for each in (axis, name))
         where = np.interp(at, places, np.arange(len(places)))
-        low, high = np.floor(where).astype(int), np.ceil(where).astype(int)
+        low = np.floor(where).astype(int)
+        high = np.ceil(where).astype(int)
         if there.dtype.kind == "f":
             weight = (where - low).reshape(-1, *[1] * (there.ndim - 1))
             known = (there[low] != FILL) & (there[high] != FILL)

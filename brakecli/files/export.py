@@ -59,7 +59,8 @@ def export(
     Raises UsageError for what the result does not have, UnreadableResultError and CannotWriteError.
     """
     check_target(target, "a kind of file", (".csv", ".wav"), [result.path])
-    suffix, kind = target.suffix.lower(), result.attributes.get("kind")
+    suffix = target.suffix.lower()
+    kind = result.attributes.get("kind")
     numbered = kind == "branch" and suffix == ".csv"
     if numbered:
         group = group or ("branch_1" if "branch_1" in result.groups else "branch_0")
@@ -188,8 +189,10 @@ def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
     if not np.any(values):
         silent = f"{name} does not change, there is nothing to hear"
         raise UsageError(f"{result.path}: {silent}; name another {argument('variable')}")
-    rate, notes = len(values) / duration, list[str]()
-    power, frequency = np.abs(np.fft.rfft(values)) ** 2, np.fft.rfftfreq(len(values), 1.0 / rate)
+    rate = len(values) / duration
+    notes = list[str]()
+    power = np.abs(np.fft.rfft(values)) ** 2
+    frequency = np.fft.rfftfreq(len(values), 1.0 / rate)
     if rate > RATE:
         lost = float(power[frequency > 0.5 * RATE].sum() / power.sum())
         if lost > _QUIET:

@@ -13,9 +13,12 @@ from brakecli.files.field import Field, integer, named, ratio, within
 from brakecli.solver.quantities import HISTORY as QUANTITIES
 from brakecli.solver.quantities import TIME
 
-TEXT, OBJECT, SENTENCE = "S", "O", "S240"
+TEXT = "S"
+OBJECT = "O"
+SENTENCE = "S240"
 MOST_WINDOWS = 16
-WINDOWS, PAIR = f"({MOST_WINDOWS},)f8", "(2,)f8"
+WINDOWS = f"({MOST_WINDOWS},)f8"
+PAIR = "(2,)f8"
 
 # A run
 

@@ -108,7 +108,8 @@ class StoredResult:
             for name in parent:
                 node = valid.member(parent, name)
                 if isinstance(node, h5py.Dataset) and not valid.is_axis_alone(node):
-                    shape, attributes = valid.shape_of(node), valid.attributes_of(node, "")
+                    shape = valid.shape_of(node)
+                    attributes = valid.attributes_of(node, "")
                     dims = valid.axes_of(node, name)[: len(shape)]
                     found[name] = Variable(dims, shape, attributes, node.dtype.kind)
             for name, each in found.items():
@@ -121,7 +122,8 @@ class StoredResult:
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
         """The rows `start` to `stop` of a variable, checked: no damage, and no number that is not finite."""
         with _explained(self.path):
-            node, where = valid.member(self._group(group), name), f"variable {name} in group {group}"
+            node = valid.member(self._group(group), name)
+            where = f"variable {name} in group {group}"
             if not isinstance(node, h5py.Dataset) or node.ndim == 0:
                 raise ValueError(f"there is no {where}")
             if node.dtype.kind not in "iufS":
@@ -161,7 +163,8 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
     with ExitStack() as stack:
         with _explained(path):
             stream = stack.enter_context(opened(path))
-            length, state = os.fstat(stream.fileno()).st_size, _digest_of(stream)
+            length = os.fstat(stream.fileno()).st_size
+            state = _digest_of(stream)
             if not trust.readings.admit(str(path), state):
                 what = "the file is truncated, damaged or was altered by another program"
                 raise ValueError(f"{what}, and only {argument('force-read')} looks at it all the same")
@@ -256,8 +259,6 @@ def _explained(path: Path) -> Iterator[None]:
         what = f"{path}: cannot be read as a result: {' '.join(reason.split())}"
         remedy = "name an intact result file, or compute it again"
         if path.suffix == ".toml" and not isinstance(error, OSError):
-            what, remedy = (
-                f"{path}: this is no result yet",
-                f"compute it first: {command('run', path)}",
-            )
+            what = f"{path}: this is no result yet"
+            remedy = f"compute it first: {command('run', path)}"
         raise UnreadableResultError(f"{what}; {remedy}") from error

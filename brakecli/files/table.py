@@ -177,7 +177,8 @@ class TextTable:
 
     def _read(self, columns: list[int]) -> list[Array]:
         """Some columns; every row is as long as the first one, and each cell holds a number, nothing or nan."""
-        rows, line = self._rows(self._lines()), self.skip
+        rows = self._rows(self._lines())
+        line = self.skip
         parts = [list[Array]() for _ in columns]
         while some := list(islice(rows, _AT_ONCE)):
             places: Sequence[int] = range(line + 1, line + 1 + len(some))

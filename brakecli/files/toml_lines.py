@@ -81,10 +81,13 @@ def split(text: str, source: str = "") -> list[tuple[int, str]]:
         if match := re.search(pattern, searched):
             raise unfit(what, remedy, source, text.count("\n", 0, match.end() - 1) + 1)
     statements = []
-    line, begin, depth = 1, 0, 0
+    line = 1
+    begin = 0
+    depth = 0
     for row in _ROW.finditer(bare):
         if not depth:
-            line, begin = line + text.count("\n", begin, row.start()), row.start()
+            line = line + text.count("\n", begin, row.start())
+            begin = row.start()
         opened, closed = (sum(map(row[0].count, marks)) for marks in ("[{", "]}"))
         depth = 0 if _HEADER.match(bare, begin) else max(0, depth + opened - closed)
         if not depth:
@@ -105,7 +108,8 @@ class Located:
         self.data: dict[str, Any] = {}
         self.lines: dict[KeyPath, int] = {}
         self.problems: list[Problem] = []
-        self._source, self._repeated = source, False
+        self._source = source
+        self._repeated = False
         table: dict[str, Any] | None = self.data
         path: KeyPath = ()
         for line, statement in split(text, source):
@@ -128,7 +132,8 @@ class Located:
         path: KeyPath = ()
         for count, key in enumerate(keys, start=1):
             new = leaf if count == len(keys) else {}  # [{}] for a header in double brackets
-            path, table = (*path, key), table.setdefault(key, type(new)())
+            path = (*path, key)
+            table = table.setdefault(key, type(new)())
             if new is leaf and {type(table), type(leaf)} == {dict, list}:
                 self._report_twice(path, line, f"has both headers [{key_text(path)}] and [[{key_text(path)}]]")
                 return None, path
@@ -136,7 +141,8 @@ class Located:
                 self.lines.setdefault(path, line)
                 table += new
             if isinstance(table, list) and table:
-                path, table = (*path, len(table) - 1), table[-1]
+                path = (*path, len(table) - 1)
+                table = table[-1]
             if not isinstance(table, dict):
                 self._report_twice(path, line)
                 return None, path
@@ -178,9 +184,11 @@ def parse(text: str, source: str = "", line: int = 1, number: Callable[[str], An
         ) from None
     except (ValueError, OverflowError) as error:
         # Beside its own error, tomllib lets through those of int() (too many digits) and of dates.
-        message, place = str(error), 0
+        message = str(error)
+        place = 0
         if position := _POSITION.search(message):
-            message, place = message[: position.start()], int(position[1] or 1) - 1
+            message = message[: position.start()]
+            place = int(position[1] or 1) - 1
         shown = printable(text.split("\n")[place].strip())
         raise unfit(
             f"is not valid TOML: {message[0].lower()}{message[1:]}" + (f" (found {shown})" if shown else ""),

@@ -6,7 +6,8 @@ Only the standard library is imported here.
 from collections.abc import Callable
 from threading import local
 
-MISSING, DIFFERS = "missing", "does not fit"
+MISSING = "missing"
+DIFFERS = "does not fit"
 _SAID = {
     MISSING: "has no digest, as files that another program has saved; what it holds is unchecked",
     DIFFERS: "its digest does not fit: it is damaged or was altered; nothing that is made of it can be trusted",
@@ -26,7 +27,9 @@ class Readings(local):
 
     def begin(self, tell: Callable[[str], object] | None = None, *, forced: bool = False) -> None:
         """Forget what was read; `tell` says from now on that a file is unchecked."""
-        self.tell, self.forced = tell, forced  # forced: files whose digest does not fit are read all the same
+        # forced: files whose digest does not fit are read all the same
+        self.tell = tell
+        self.forced = forced
         self.unchecked: dict[str, str] = {}  # path and digest of those for which none vouches
 
     def force(self, wanted: bool) -> bool:

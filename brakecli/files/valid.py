@@ -23,7 +23,9 @@ LARGEST_SQUARE = 1e300  # magnitude in variables that hold squares, as spectra d
 BLOCK = 1 << 20  # rows read at a time
 _CONTROLS = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f]")  # which neither XML nor TOML may hold
 _RATIO = 1100  # no filter of HDF5 makes data smaller than this
-DEEPEST, _MOST_NODES = 8, 10_000  # levels of groups and their variables, and the number of both
+# levels of groups and their variables, and the number of both
+DEEPEST = 8
+_MOST_NODES = 10_000
 _MOST_ATTRIBUTES = 1000  # of a group or a variable
 MOST_MEMORY = 1_250_000_000  # bytes of unpacked values: a variable of the largest sweep takes nearly as many
 _TEXTS = ("format", "kind", "title", "case_toml", "resolved_toml", "sweep_toml", "resolved_sweep_toml")
@@ -139,7 +141,8 @@ def tree(file: h5py.File) -> dict[str, Any]:
 
     Raises ValueError where there are too many, or groups too deep in others.
     """
-    names, groups = {file["/"]: "/"}, [("", file["/"])]
+    names = {file["/"]: "/"}
+    groups = [("", file["/"])]
     for path, group in groups:
         for key in group:
             if (node := member(group, key)) is not None and node not in names:
@@ -171,9 +174,11 @@ def look_through(file: h5py.File, length: int, *, everything: bool) -> None:
 
 def check_size(node: h5py.Dataset, length: int, where: str) -> None:
     """Raise ValueError for a dataset that claims more than a file of this length (bytes) can hold."""
-    plist, stored = node.id.get_create_plist(), node.id.get_storage_size()
+    plist = node.id.get_create_plist()
+    stored = node.id.get_storage_size()
     ratio = _RATIO if packed(node) else 1
-    room, chunk = node.size * node.dtype.itemsize, 0
+    room = node.size * node.dtype.itemsize
+    chunk = 0
     if plist.get_layout() == h5d.CHUNKED:
         chunk = int(np.prod(node.chunks, dtype=object)) * node.dtype.itemsize
     own = plist.get_layout() in (h5d.CHUNKED, h5d.CONTIGUOUS, h5d.COMPACT) and not plist.get_external_count()

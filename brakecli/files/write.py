@@ -98,7 +98,8 @@ class ResultFile:
 
         A scalar belongs in an attribute: HDF5 keeps no checksum of one.
         """
-        name, growing = field.name, self._growing.setdefault(group, {})
+        name = field.name
+        growing = self._growing.setdefault(group, {})
         attributes = {"units": field.units, "long_name": field.meaning, **attributes}
         variable = _Variable(field, tuple(dims), attributes, np.empty(0, field.kind))
         if not dims or name in growing:
@@ -180,7 +181,8 @@ class ResultFile:
 
     def read(self, group: str, name: str, start: int, stop: int) -> NDArray[Any]:
         """The rows `start` to `stop` of a growing variable, of those appended so far; both are >= 0."""
-        written, waiting = self._growing[group][name].written, self._growing[group][name].waiting
+        written = self._growing[group][name].written
+        waiting = self._growing[group][name].waiting
         if not written:
             return waiting[start:stop]
         with self._hdf5():
@@ -231,7 +233,8 @@ class ResultFile:
 
     def _write_rows(self, group: str, variable: _Variable, count: int) -> None:
         """Write the first of the waiting rows behind those that are written."""
-        rows, variable.waiting = variable.waiting[:count], variable.waiting[count:]
+        rows = variable.waiting[:count]
+        variable.waiting = variable.waiting[count:]
         if not variable.written:  # created only now, so that a short series gets a chunk of just its length
             self._create(group, variable, rows.shape, rows.dtype, grows=True)[...] = rows
         else:
@@ -251,7 +254,8 @@ class ResultFile:
         **how: Any,
     ) -> Any:
         """Create a dataset with checksums, its attributes and axes."""
-        parent, name = self._file.require_group(group), variable.field.name
+        parent = self._file.require_group(group)
+        name = variable.field.name
         maxshape = (None,) * len(shape) if grows else None  # HDF5 takes no chunk longer than its dataset can get
         options = {"chunks": _chunks(shape), "maxshape": maxshape, "fletcher32": True, **how}
         dataset = parent.create_dataset(name, shape, kind, **options)
@@ -285,7 +289,8 @@ def new_result(path: Path, *, force: bool) -> Iterator[ResultFile]:
 
 def _chunks(shape: tuple[int, ...]) -> tuple[int, ...]:
     """The chunks of a dataset: the longest last dimensions that fit."""
-    room, chunks = _CHUNK, list[int]()
+    room = _CHUNK
+    chunks = list[int]()
     for length in reversed(shape):
         chunks.insert(0, max(1, min(length, room)))
         room //= chunks[0]
@@ -310,7 +315,8 @@ def _finite(name: str, values: ArrayLike) -> NDArray[Any]:
 
 def _checked(group: str, name: str, values: ArrayLike, kind: str) -> NDArray[Any]:
     """The values in the type of the file; a number that would not come back as it was is refused."""
-    array, where = np.asarray(values), f"{group}/{name}"
+    array = np.asarray(values)
+    where = f"{group}/{name}"
     if array.dtype.kind == "U":
         text = np.char.encode(array, "utf-8")
         return text.astype(h5py.string_dtype("utf-8", max(1, text.dtype.itemsize)))

@@ -38,7 +38,8 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     from brakecli.files.read import open_result
 
     with open_result(Path(source), kind="run") as result:
-        given, resolved = result.text("case_toml"), result.text("resolved_toml")
+        given = result.text("case_toml")
+        resolved = result.text("resolved_toml")
     label = f"{source} (its resolved case)"
     try:
         parse_case(resolved, label)

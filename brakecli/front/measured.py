@@ -61,7 +61,8 @@ class Measured:
         from brakecli.analysis.regime.signal_file import read_signal
         from brakecli.analysis.regime.signal_table import SignalThresholds
 
-        name, reading = self.quantity_of(source), asdict(self)
+        name = self.quantity_of(source)
+        reading = asdict(self)
         if name not in set(Measurand):
             raise UsageError(
                 f"{argument('quantity')} {printable(str(name))}: is not known; give one of {', '.join(Measurand)}"

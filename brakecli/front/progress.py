@@ -10,7 +10,8 @@ from typing import TextIO, cast
 
 from brakecli.files.os_signals import Styled, lastly
 
-FIRST_LINE, LAST_LINES = 20.0, 600.0
+FIRST_LINE = 20.0
+LAST_LINES = 600.0
 """Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
 
 
@@ -32,7 +33,9 @@ def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[s
     What a line has said of is also said when it is complete.
     """
     if quiet or sys.stderr is None or not sys.stderr.isatty():
-        start, due, open_total = time.monotonic(), first_line, 0
+        start = time.monotonic()
+        due = first_line
+        open_total = 0
 
         def tell(what: str, done: int, total: int) -> None:
             nonlocal due, open_total

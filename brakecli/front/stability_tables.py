@@ -35,7 +35,9 @@ def stability_table(
     output: Path | None = None,
 ) -> str:
     """Steady sliding, its modes and both thresholds of friction; below that what there is along a key."""
-    rest, critical, discrete = report.equilibrium, report.critical, report.discrete
+    rest = report.equilibrium
+    critical = report.critical
+    discrete = report.discrete
     undamped = {"flutter": report.undamped_flutter, "divergence": report.undamped_divergence}
     known = [f"{kind} at {friction:.7g}" for kind, friction in undamped.items() if friction is not None]
     sliding = f"none: {report.no_equilibrium}"
@@ -60,7 +62,9 @@ def stability_table(
         what = f"{motion}, damping ratio {mode.damping_ratio:.3g}, {shape}"
         rows.append((f"mode at {mode.frequency:.5g} Hz", what))
     if discrete:
-        limit, friction, radius = discrete.step_limit, discrete.critical_friction, discrete.spectral_radius
+        limit = discrete.step_limit
+        friction = discrete.critical_friction
+        radius = discrete.spectral_radius
         bias = "" if discrete.bias is None else f", {discrete.bias:+.2g} from the exact one"
         rows += [
             ("the scheme's growth", f"{text_of(discrete.growth, '1/s')}, a factor {radius:.8g} a step"),
@@ -94,7 +98,8 @@ def _lock_in(found: LockIn) -> str:
     """Critical friction and both modes along a key, and where stability changes."""
     from brakecli.sweeps.result import unit
 
-    entries, keys = found.entries, ", ".join(found.parameters)
+    entries = found.entries
+    keys = ", ".join(found.parameters)
     columns = {"value": [f"{entry['value']:.6g}" for entry in entries]}
     columns |= {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
     looks = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
@@ -132,7 +137,9 @@ def _until(change: Change) -> str:
 
 def advice_table(report: AdviceReport) -> str:
     """What moves the critical friction, what to change, and the answer in a sentence."""
-    found, check, margin = report.stability, report.check, report.margin
+    found = report.stability
+    check = report.check
+    margin = report.margin
     moving = [each for each in report.sensitivities if each.elasticity or each.derivative or each.growth_change]
     moves = {
         "what moves it": [each.parameter for each in moving],
@@ -159,7 +166,8 @@ def advice_table(report: AdviceReport) -> str:
         ("margin", "-" if margin is None else f"{margin:.1%}; {report.wanted_margin:.1%} is wanted"),
     ]
     if under := report.squeal:
-        low, high = under.squeal_lower, under.squeal_upper
+        low = under.squeal_lower
+        high = under.squeal_upper
         rows.append(("squeal under scatter", f"{under.squeal_probability:.2%} (95 %: {low:.2%} to {high:.2%})"))
     ends: list[Row] = [("note", report.notes())]
     if check:

@@ -36,7 +36,8 @@ IF_KNOWN = (
     "amplitude_forced",
     "amplitude_own",
 )
-MOST_LISTED_POINTS, MOST_LISTED_BURSTS = 30, 12
+MOST_LISTED_POINTS = 30
+MOST_LISTED_BURSTS = 12
 NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
 
 Row = tuple[str, str | Sequence[str]]
@@ -56,7 +57,9 @@ ENTRIES = (
 
 def run_table(report: RunReport) -> str:
     """Summary of a run."""
-    numbers, work, method = report.numbers(), report.motion.work, report.motion.system.method
+    numbers = report.numbers()
+    work = report.motion.work
+    method = report.motion.system.method
     weights = ", ".join(f"{weight:.4g}" for weight in method.theta)
     kept = "" if method.row.exact else f", tolerance {method.tolerance:.4g}"
     how = kept if method.own_steps else f" ({weights}), {method.iteration}"
@@ -66,7 +69,8 @@ def run_table(report: RunReport) -> str:
     step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
     peak = text_of(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
-    since, resolution = f"from {numbers['settled_from']:.4g} s on", numbers["frequency_resolution"]
+    since = f"from {numbers['settled_from']:.4g} s on"
+    resolution = numbers["frequency_resolution"]
     rows = [
         ("failed", [numbers["failure"]] if work.failed else []),
         *_verdict_rows(numbers),
@@ -89,7 +93,8 @@ def run_table(report: RunReport) -> str:
 
 def disturbances(numbers: Mapping[str, Any]) -> list[str]:
     """Whether neighbours of a motion come to it, where that was asked."""
-    rate, error = numbers.get("lyapunov_exponent"), numbers.get("lyapunov_error")
+    rate = numbers.get("lyapunov_exponent")
+    error = numbers.get("lyapunov_error")
     if rate is None or error is None:
         return []
     what = "fade" if rate < 0.0 else "grow"
@@ -105,7 +110,8 @@ def verdict_table(source: str, numbers: Mapping[str, Any]) -> str:
     noise_unit = "m/s" if quantity == "acceleration" else si_unit  # an acceleration is judged by its integral
     tones = numbers.get("bursts", ())
     for tone in tones[:MOST_LISTED_BURSTS]:
-        when, level = f"{tone['start']:.4g} to {tone['end']:.4g} s", f"{tone['level']:.3g} {si_unit}"
+        when = f"{tone['start']:.4g} to {tone['end']:.4g} s"
+        level = f"{tone['level']:.3g} {si_unit}"
         rows.append(("burst", f"{when}: {tone['frequency']:.6g} Hz, {level}"))
     if len(tones) > MOST_LISTED_BURSTS:
         rows.append(("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json"))
@@ -119,7 +125,8 @@ def verdicts_table(results: Sequence[Mapping[str, Any]]) -> str:
     """The verdicts on several files, one in a row."""
     because = [each.get("error") or "; ".join(each["reasons"]) for each in results]
     regimes = [each.get("regime", "unreadable") for each in results]
-    names, tones = [each["source"] for each in results], [*map(_tone, results)]
+    names = [each["source"] for each in results]
+    tones = [*map(_tone, results)]
     return grid({"file": names, "regime": regimes, "Hz": tones, "because": because})
 
 
@@ -149,8 +156,11 @@ def _interval(found: Mapping[str, Any]) -> str:
 
 def check_table(title: str, found: Check) -> str:
     """What a run would cost and which limits it meets."""
-    system, limits, has_step = found.system, found.limits, found.step is not None
-    (low, high), (link_low, link_high) = system.natural_frequencies, found.link_frequencies
+    system = found.system
+    limits = found.limits
+    has_step = found.step is not None
+    low, high = system.natural_frequencies
+    link_low, link_high = found.link_frequencies
     growth = f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"
     coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
     rows = [
@@ -191,7 +201,8 @@ def _cost_rows(found: Check | Estimate) -> list[Row]:
 
 def sweep_table(report: SweepReport) -> str:
     """Summary of a sweep, and every point of a small one."""
-    found, critical = report.findings, report.loaded.sweep.critical
+    found = report.findings
+    critical = report.loaded.sweep.critical
     resumed = f", {report.resumed} of them computed before" if report.resumed else ""
     rows: list[Row] = [
         ("points", f"{found.points}{resumed}"),
@@ -235,7 +246,8 @@ def _points_table(report: SweepReport) -> str:
     """A row for each point: its place on the axes, and what was found there."""
     from brakecli.sweeps.plan import label
 
-    found, plan = report.findings, report.loaded.plan
+    found = report.findings
+    plan = report.loaded.plan
     places = [plan.places(point % plan.points) for point in range(found.points)]
     columns = {}
     if "direction" in found.dimensions:
@@ -258,7 +270,8 @@ def _points_table(report: SweepReport) -> str:
 
 def comparison_table(report: ComparisonReport) -> str:
     """The entries that no other beats, the finest of each other method, and what is recommended."""
-    found, best = report.comparison, report.recommended
+    found = report.comparison
+    best = report.recommended
     entries = list(zip(found.entries, report.numbers()["entries"], strict=True))
     for _, numbers in entries:
         numbers["milliseconds"] = 1e3 * (numbers["wall_seconds"] or 0.0)

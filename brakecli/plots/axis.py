@@ -10,7 +10,9 @@ from matplotlib.axis import XAxis, YAxis
 
 from brakecli.plots import style
 
-_LONGEST_KEY, _MOST_TEXTS, _MOST_CHARACTERS = 45, 30, 70
+_LONGEST_KEY = 45
+_MOST_TEXTS = 30
+_MOST_CHARACTERS = 70
 _FEW = 6  # values of an axis up to which each has its tick
 _MORE_ALIKE = 0.999  # spread of ratios over that of distances: where both are the same, the axis is linear
 _APART = 0.1  # of an axis: values that are nearer to each other have no tick each
@@ -33,7 +35,8 @@ class Axis:
         values = self.values
         if self.texts is not None or len(values) < 3 or values[0] <= 0.0 or values[-1] < _LEAST_LOG * values[0]:
             return False
-        steps, ratios = np.diff(values), np.diff(np.log(values))
+        steps = np.diff(values)
+        ratios = np.diff(np.log(values))
         return bool(np.std(ratios) / np.mean(ratios) < _MORE_ALIKE * np.std(steps) / np.mean(steps))
 
     @property
@@ -65,7 +68,8 @@ class Axis:
         with suppress(ValueError):
             if self.texts is not None:
                 return self.texts.index(value)
-            number, values = float(value), self.values
+            number = float(value)
+            values = self.values
             low, high = self.edges[[0, -1]] if len(values) > 1 else values[[0, 0]]
             if abs(number - 0.5 * (low + high)) <= 0.5 * (high - low) + 1e-5 * style.largest(values):
                 return int(np.argmin(np.abs(values - number)))
@@ -73,7 +77,9 @@ class Axis:
 
     def apply_to(self, axis: XAxis | YAxis) -> None:
         """Set scale, ticks and label of an axis of a panel."""
-        side, values, texts = axis.axis_name, self.values, self.texts
+        side = axis.axis_name
+        values = self.values
+        texts = self.texts
         factor, units = style.prefixed(style.largest(values), self.units)
         if texts is not None:
             step = -(-len(texts) // _MOST_TEXTS)

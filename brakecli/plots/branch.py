@@ -13,7 +13,9 @@ from brakecli.faces import argument
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 
-_WIDTH, _HEIGHT = 8.8, 6.6  # inches
+# inches
+_WIDTH = 8.8
+_HEIGHT = 6.6
 _COLOURS = style.BLUE, style.VERMILION, style.GREEN, style.ORANGE
 _MARKERS = {
     "flutter": "o",
@@ -45,7 +47,8 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     groups = sorted(
         (name for name in result.groups if name.startswith("branch_") and "/" not in name), key=_number
     )
-    attributes, branches = result.attributes, []
+    attributes = result.attributes
+    branches = []
     for group in groups:
         columns = {name: np.asarray(result.read(group, name), float) for name in names}
         kind = str(result.group_attributes(group).get("kind", ""))
@@ -60,7 +63,8 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     if not groups or not any(len(columns["value"]) for _, columns, _ in branches):
         raise UsageError(f"{result.path}: holds no motion, so there is nothing to draw")
     units = style.unit_of(result.variables(groups[0])["value"].attributes)
-    key, sentence = str(attributes.get("parameter", "")), str(attributes.get("sentence", ""))
+    key = str(attributes.get("parameter", ""))
+    sentence = str(attributes.get("sentence", ""))
     figure = style.headed(_WIDTH, _HEIGHT, str(attributes.get("title", "")), sentence, hspace=0.05)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
     sizes = np.concatenate([np.zeros(0), *(each[upper_name] for kind, each, _ in branches if kind != _SLIDING)])
@@ -110,7 +114,9 @@ def _other_mode(frequency: style.Array, multipliers: style.Array) -> style.Array
     fast as it changes beside them. After flutter it stays open, and their frequencies are nearly the same.
     """
     angles = np.abs(np.arctan2(multipliers[..., 1], multipliers[..., 0])).max(axis=1) / (2.0 * np.pi)
-    before, after, apart = frequency[:-1], frequency[1:], (angles * frequency)[:-1]
+    before = frequency[:-1]
+    after = frequency[1:]
+    apart = (angles * frequency)[:-1]
     other = np.minimum(np.abs(after - before - apart), np.abs(after - before + apart))
     gap = np.ptp(np.hypot(multipliers[..., 0], multipliers[..., 1]), axis=1)
     beside = np.pad(np.abs(np.diff(gap)), 1)
@@ -120,7 +126,8 @@ def _other_mode(frequency: style.Array, multipliers: style.Array) -> style.Array
 
 def _with_ends(columns: dict[str, Any], marks: dict[str, Any]) -> dict[str, Any]:
     """A branch with the special points between its motions at which it gains or loses its stability."""
-    values, at = columns["value"], np.asarray(marks["value"], float)
+    values = columns["value"]
+    at = np.asarray(marks["value"], float)
     for place in np.flatnonzero(np.diff(columns["stable"]))[::-1].tolist():
         low, high = sorted(values[place : place + 2].tolist())
         for mark in np.flatnonzero((low < at) & (at < high))[:1].tolist():

@@ -24,7 +24,9 @@ _PANELS = (  # column, factor, title and label of the work
 )
 _MARKERS = {"0.5, 0.5": "o", "1, 0.5": "^", "0.5, 1": "v", "1, 1": "s"}  # by weights: of two layers
 _MARKERS |= {"0.25, 0.5, 0.25": "o", "0.0833333, 0.833333, 0.0833333": "D", "": "*"}  # of three, and none
-_EXACT, _OTHER_NODES = "#CC79A7", "#56B4E9"  # colours of the exact contact force, of entries on nodes alone
+# colours of the exact contact force, of entries on nodes alone
+_EXACT = "#CC79A7"
+_OTHER_NODES = "#56B4E9"
 _NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
 
 
@@ -39,10 +41,12 @@ def draw(result: StoredResult) -> Figure:
     best = result.attributes.get("recommended")
     if best is not None and not (isinstance(best, int) and 0 <= best < len(columns["error"])):
         raise style.unreadable(result, "it recommends an entry that it does not hold")
-    heading, lines = str(result.attributes.get("title", "")), _lines(result.attributes, columns, best)
+    heading = str(result.attributes.get("title", ""))
+    lines = _lines(result.attributes, columns, best)
     target, floor = (float(result.attributes.get(name, 0.0)) for name in ("target_error", "reference_error"))
     drawn = (columns["error"] > 0.0) & (columns["error"] <= LARGEST)
-    errors, columns["error"] = columns["error"], np.where(drawn, columns["error"], np.nan)
+    errors = columns["error"]
+    columns["error"] = np.where(drawn, columns["error"], np.nan)
     rows = _PANELS if np.isfinite(columns["wall_seconds"]).any() else _PANELS[1:]
     figure = style.headed(12.4, 6.6, heading, *lines, columns=len(rows), wspace=0.04)
     panels = style.panels(figure, 1, len(rows), sharey=True)[0]
@@ -118,7 +122,8 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
             colour = _EXACT
         elif entry["evaluator"] == "midpoint":
             place = others.index(entry["nodes"]) % len(_NODE_MARKERS) if entry["nodes"] in others else -1
-            colour, marker = _OTHER_NODES, _NODE_MARKERS[place] if place >= 0 else "X"
+            colour = _OTHER_NODES
+            marker = _NODE_MARKERS[place] if place >= 0 else "X"
         size, width, above = (9.0, 2.0, 3.0) if own else (5.0, 1.1, 2.0)
         face = "white" if entry["start"] == "paper" else colour
         dashes = (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-"

@@ -40,10 +40,14 @@ def draw(picture: SweepPicture) -> Figure:
 
 def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     """The critical value along the axis of a sweep, and the least sustained one where it differs."""
-    critical, axis = picture.critical, picture.axes[0]
+    critical = picture.critical
+    axis = picture.axes[0]
     assert critical is not None
-    x, value, sustained = axis.values, picture["critical"][0], picture["critical_sustained"][0]
-    eigenvalue, size = picture["critical_eigenvalue"][0], sweep.size_of(len(x))
+    x = axis.values
+    value = picture["critical"][0]
+    sustained = picture["critical_sustained"][0]
+    eigenvalue = picture["critical_eigenvalue"][0]
+    size = sweep.size_of(len(x))
     marker, ms, ls = (".", 0.6 * size, "-") if axis.texts is None else ("_", 16.0, "none")
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", marker=marker, ms=ms, ls=ls)
     regained = picture["critical_status"][0] == Outcome.REGAINED
@@ -55,7 +59,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
                 axes.errorbar(x[there], value[there], error, mfc=face, label=label, **_bars(size))
     elif regained.any():
         axes.plot(x[regained], value[regained], "o", mfc="white", mec=style.DARK, label="stable above")
-    low, high = picture["critical_windows_lower"][0], picture["critical_windows_upper"][0]
+    low = picture["critical_windows_lower"][0]
+    high = picture["critical_windows_upper"][0]
     if (high < critical.upper).any():  # otherwise all is unstable above the critical value
         bars: dict[str, Any] = {"color": style.BLUE, "alpha": 0.2, "lw": 1.2 * size, "zorder": 0.8}
         axes.vlines(np.repeat(x, low.shape[1]), low.ravel(), high.ravel(), label="unstable", **bars)
@@ -78,32 +83,40 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
 
 def _simulated(picture: SweepPicture) -> bool:
     """Whether runs measured a critical value: where steps are exact, all are those of the eigenvalues."""
-    critical, value = picture.critical, picture["critical"]
+    critical = picture.critical
+    value = picture["critical"]
     apart = np.isfinite(value) & (value != picture["critical_eigenvalue"])
     return critical is not None and critical.method == "simulation" and bool(apart.any())
 
 
 def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     """By how much the critical value by simulation lies above the one by eigenvalues, with its error bars."""
-    x, difference = picture.axes[0].values, (picture["critical"] - picture["critical_eigenvalue"])[0]
+    x = picture.axes[0].values
+    difference = (picture["critical"] - picture["critical_eigenvalue"])[0]
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
     axes.axhline(0.0, color=style.DARK, lw=1.1)
     axes.errorbar(x, difference, error, **_bars(sweep.size_of(len(x))))
     axes.margins(y=0.15)
-    highest, name = style.largest(np.abs(difference) + error), "simulation\nless eigenvalue"
+    highest = style.largest(np.abs(difference) + error)
+    name = "simulation\nless eigenvalue"
     style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], name)
 
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     """Amplitude or frequency; points have the colour of their regime, and are arrows if it was followed."""
-    axis, unit, died = picture.axes[0], picture.units[name], picture.died(name)
+    axis = picture.axes[0]
+    unit = picture.units[name]
+    died = picture.died(name)
     values = np.where(died, np.nan, picture[name])  # what dies out has no place on a curve
     factor, unit = style.prefixed(style.largest(values), unit)
     lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
     least = max(lasting / _FAINT, float(values[values > 0.0].min())) if wide else 0.0
-    x, size, small = axis.values, sweep.size_of(len(axis.values)), values < least
-    shaken, none = picture["excitation"] == Excitation.FORCED, np.full_like(values, np.nan)
+    x = axis.values
+    size = sweep.size_of(len(axis.values))
+    small = values < least
+    shaken = picture["excitation"] == Excitation.FORCED
+    none = np.full_like(values, np.nan)
     forced = picture.variables.get(sweep.FORCED_PART, none) if name == "amplitude" else none
     forced = np.where(forced >= least, forced, np.nan)  # beside what the shoe adds
     for number, direction in enumerate(picture.directions):
@@ -131,7 +144,8 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         axes.axvline(crossing, color=style.DARK, lw=1.1, ls=style.DASHES, zorder=0.7, label=sweep.CRITICAL_LINE)
     words = picture.long_names[name].replace("`", "")
     axes.set(ylabel=style.labelled(name.replace("_", " "), unit), title=words[:1].upper() + words[1:])
-    floor, highest = factor * least, factor * float(np.nanmax(values, initial=0.0))
+    floor = factor * least
+    highest = factor * float(np.nanmax(values, initial=0.0))
     if not np.isfinite(values).any():
         axes.set_yticks([])
         nothing = "no sustained vibration" if name in ("amplitude", "frequency") else "no values"

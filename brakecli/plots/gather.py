@@ -41,12 +41,14 @@ def gather(
         sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
     except CaseError as error:
         raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
-    known, variables = result.variables("/"), _variables(result, sweep, shown, more)
+    known = result.variables("/")
+    variables = _variables(result, sweep, shown, more)
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
     units = {name: style.unit_of(each.attributes) for name, each in known.items()}
     long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
-    listed, axes = _listed(result), []
+    listed = _listed(result)
+    axes = []
     # a list over a single key is a sweep along this key
     alone = len(listed) == 1 and len(listed[0][0].values) == len(listed[0][1])
     along, listed = (listed[0][0].dimension, ()) if alone else ("", listed)
@@ -86,7 +88,8 @@ def _axis(result: StoredResult, name: str, values: style.Array) -> Axis:
 def _listed(result: StoredResult) -> tuple[tuple[Axis, style.Array], ...]:
     """An axis of each key of listed points that varies, and where along it each of them lies."""
     found = []
-    known, point = result.variables("/"), fields.LISTED_POINT.name
+    known = result.variables("/")
+    point = fields.LISTED_POINT.name
     keys = np.ravel(known[point].attributes.get("parameters", ())) if point in known else ()
     for name in (str(key).replace(".", "_") for key in keys):
         if known[name].dims != (point,):
@@ -142,7 +145,8 @@ def _attractors(variables: Mapping[str, style.Array]) -> Iterator[str]:
     for number in range(1, int(np.nanmax(numbers, initial=0)) + 1):
         here = numbers == number
         regimes, counts = np.unique(variables["regime"][here], return_counts=True)
-        regime, share = str(regimes[counts.argmax()]), float(here.mean())
+        regime = str(regimes[counts.argmax()])
+        share = float(here.mean())
         frequency, amplitude = (float(np.median(variables[name][here])) for name in ("frequency", "amplitude"))
         if np.all(variables["excitation"][here] == Excitation.NONE):
             amplitude = 0.0  # what dies comes to steady sliding
@@ -161,8 +165,10 @@ def numeric(result: StoredResult) -> list[str]:
 
 def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
     key, _, value = (part.strip() for part in wanted.partition("="))
-    value, both = value.strip("\"'"), len(picture.directions) > 1
-    problem, choices = "no axis has this key or value", [axis.key for axis in picture.axes] + both * ["direction"]
+    value = value.strip("\"'")
+    both = len(picture.directions) > 1
+    problem = "no axis has this key or value"
+    choices = [axis.key for axis in picture.axes] + both * ["direction"]
     if key == "direction" and both:
         if value in picture.directions:
             return picture.towards(value)
@@ -174,7 +180,8 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
                 same = axis.texts or style.readable(float(axis.values[place])) == style.readable(float(value))
                 note = "" if same else f" (nearest to {value})"
                 return replace(picture, chosen=(*picture.chosen[:-1], picture.chosen[-1] + note))
-            problem, choices = "no point has this value", [*(axis.texts or map(label, axis.values.tolist()))]
+            problem = "no point has this value"
+            choices = [*(axis.texts or map(label, axis.values.tolist()))]
     some = textwrap.shorten(", ".join(choices), 120, placeholder=" …")
     remedy = f"give one of {some}, as KEY=VALUE" if choices else "leave it out"
     raise UsageError(f"{result.path}: {argument('select')} {wanted}: {problem}; {remedy}")
@@ -182,7 +189,8 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
 
 def _check_drawable(picture: SweepPicture, result: StoredResult) -> None:
     """Raise UsageError where there are no axes to draw along, or too many, or too long ones."""
-    count, both = len(picture.axes), len(picture.directions) > 1
+    count = len(picture.axes)
+    both = len(picture.directions) > 1
     keys = ", ".join([axis.key for axis in picture.axes] + both * ["direction"])
     least = min((len(axis.values) for axis in picture.axes), default=0)
     remedy = f"draw a part of it with {argument('select')} KEY=VALUE for one of {keys}"

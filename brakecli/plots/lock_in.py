@@ -10,7 +10,9 @@ from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
 
-_WIDTH, FEW = 8.8, 40  # inches; values up to which each has a marker
+# inches; values up to which each has a marker
+_WIDTH = 8.8
+FEW = 40
 _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the dashed one where modes have met
     {"color": "#7DB9DE", "lw": 4.0, "ls": "-", "marker": "o", "ms": 6.5, "solid_capstyle": "round"},
     {"color": style.VERMILION, "lw": 1.5, "ls": style.DASHES, "marker": "o", "ms": 3.0},
@@ -23,7 +25,8 @@ def draw(result: StoredResult) -> Figure:
     if not place:
         raise style.unreadable(result, "the axis of the key is missing")
     attributes = result.variables("/")[place].attributes
-    key, units = str(attributes.get("long_name", "")), style.unit_of(attributes)
+    key = str(attributes.get("long_name", ""))
+    units = style.unit_of(attributes)
     x, *modes = (style.read_column(result, name) for name in (place, "frequencies", "growth_rates"))
     if not np.isfinite(x).all() or any(values.shape != (len(x), 2) for values in modes):
         raise style.unreadable(result, "its variables do not fit the axis of the key")

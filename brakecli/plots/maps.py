@@ -18,12 +18,18 @@ from brakecli.plots.sweep import Sign, SweepPicture
 from brakecli.sweeps.record import Status
 
 _LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
-_MAP_WIDTH, _PANEL_WIDTH = 10.4, 3.0  # inches, of a figure with two columns of maps, and of each of more maps
-_MOST_NUMBERS, _LEAST_CELL = 80, 0.5  # cells with a number, and how wide they must be (inches)
+# inches, of a figure with two columns of maps, and of each of more maps
+_MAP_WIDTH = 10.4
+_PANEL_WIDTH = 3.0
+# cells with a number, and how wide they must be (inches)
+_MOST_NUMBERS = 80
+_LEAST_CELL = 0.5
 _CONTOURED = 0.3  # part of the cells whose corners are known, from which on lines are drawn instead of numbers
 _DARK = 0.6  # part of the colours, from the dark end on, on which numbers are white
 _EMPTY = "#F7F7F7"  # of cells without a value
-_ALIKE, _CRITICAL_ALIKE = 1e-6, 1e-2  # relative difference from which on numbers have different colours
+# relative difference from which on numbers have different colours
+_ALIKE = 1e-6
+_CRITICAL_ALIKE = 1e-2
 _DOT = 8.0  # points (1/72 inch) across, of a listed point
 _MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
@@ -39,7 +45,8 @@ class Scale(NamedTuple):
 
 def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over two axes, or over three: then a column of maps for each value of one of them."""
-    critical, sliced = picture.critical is not None, len(picture.axes) == 3
+    critical = picture.critical is not None
+    sliced = len(picture.axes) == 3
     asked = picture.shown if picture.shown != sweep.ATTRACTOR else ""  # it has a map of its own
     shown = asked or ("critical" if critical else "amplitude")
     scale = _amplitude_scale(picture) if shown == "amplitude" else _scale(picture, shown)
@@ -50,7 +57,8 @@ def draw(picture: SweepPicture) -> Figure:
     layers = layers if critical else {**starts, **layers}
     if sliced:
         pieces = slices(picture)
-        width, height = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces)), 4.6 if critical else 7.2
+        width = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces))
+        height = 4.6 if critical else 7.2
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
         width, height = (sweep.WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
@@ -87,11 +95,9 @@ def _amplitude_scale(picture: SweepPicture) -> Scale:
     least, largest, wide = picture.lasting_amplitudes()
     largest = largest or style.largest(picture["amplitude"][~picture.died("amplitude")])
     factor, unit = style.prefixed(largest, picture.units["amplitude"])
-    low, high, drawn = (
-        factor * least if wide else 0.0,
-        factor * largest or 1.0,
-        factor * picture["amplitude"][~picture.died("amplitude")],
-    )
+    low = factor * least if wide else 0.0
+    high = factor * largest or 1.0
+    drawn = factor * picture["amplitude"][~picture.died("amplitude")]
     beyond = int((drawn < low).any()) + 2 * int((drawn > 1.0001 * high).any())
     norm = LogNorm(low, high) if wide else Normalize(low, high)
     return Scale(f"amplitude ({unit})", norm, factor, ("neither", "min", "max", "both")[beyond])
@@ -99,7 +105,9 @@ def _amplitude_scale(picture: SweepPicture) -> Scale:
 
 def _scale(picture: SweepPicture, name: str) -> Scale:
     """Colours from the least to the greatest number; numbers that hardly differ have one colour."""
-    critical, unit, drawn = picture.critical, picture.units[name], np.isfinite(picture[name])
+    critical = picture.critical
+    unit = picture.units[name]
+    drawn = np.isfinite(picture[name])
     values = picture[name][drawn & ~picture.died(name)] if name == "frequency" else picture[name][drawn]
     words = name.replace("_", " ")
     low, high = (float(values.min()), float(values.max())) if values.size else (0.0, 1.0)
@@ -108,7 +116,8 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
         low, high = (low, high) if values.size else (critical.lower, critical.upper)
     largest = max(abs(low), abs(high))
     if high - low <= (_CRITICAL_ALIKE if name == "critical" else _ALIKE) * largest:
-        low, high = low - (0.01 * largest or 1.0), high + (0.01 * largest or 1.0)
+        low = low - (0.01 * largest or 1.0)
+        high = high + (0.01 * largest or 1.0)
     factor, unit = style.prefixed(largest, unit)
     return Scale(style.labelled(words, unit), Normalize(factor * low, factor * high), factor)
 
@@ -140,7 +149,8 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
 
 def _draw_attractors(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable:
     """A colour for each attractor; the legend says what it is."""
-    numbers, count = picture[sweep.ATTRACTOR], len(picture.attractors)
+    numbers = picture[sweep.ATTRACTOR]
+    count = len(picture.attractors)
     colours = ListedColormap(sweep.shades(count))
     for number, label in enumerate(picture.attractors[: sweep.MOST_NAMED]):
         axes.plot([], [], "s", ms=9, mfc=colours(number), mec="none", label=label)
@@ -180,7 +190,9 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     width = axes.get_window_extent().width / axes.figure.dpi
     if values.size <= _MOST_NUMBERS and width > _LEAST_CELL * len(values):
         for i, j in np.argwhere(known):
-            x, y, value = picture.axes[0].values[i], picture.axes[1].values[j], values[i, j]
+            x = picture.axes[0].values[i]
+            y = picture.axes[1].values[j]
+            value = values[i, j]
             colour = "white" if scale.norm(value) < _DARK else "black"
             axes.text(x, y, f"{value:.4g}", ha="center", va="center", size=8.0, color=colour)
     return mesh
@@ -209,7 +221,9 @@ def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, 
         seams = {"edgecolors": "white", "linewidth": 0.4} if drawn.size <= 1000 else {"edgecolors": "face"}
         mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=drawn.size > _MOST_DRAWN)
         axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
-        box, scale = axes.get_window_extent(), 72.0 / float(axes.figure.dpi)  # signs are small where cells are
+        # signs are small where cells are
+        box = axes.get_window_extent()
+        scale = 72.0 / float(axes.figure.dpi)
         size = float(np.clip(0.4 * min(box.width / len(x.values), box.height / len(y.values)) * scale, 1.0, 7.0))
     for where, sign in signs:
         if where.any():  # drawn above contours

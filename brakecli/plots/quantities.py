@@ -39,9 +39,11 @@ class Scaled:
 def scaled(variable: str, values: style.Array, whole: style.Array, also: float = 0.0) -> Scaled:
     """The axis of values in SI units, as small as they are in the whole run, where `also` is drawn beside them."""
     _, name, _, unit = VARIABLES[variable]
-    largest, moves = max(style.largest(whole), also), float(np.ptp(values))
+    largest = max(style.largest(whole), also)
+    moves = float(np.ptp(values))
     if moves <= max(STILL * float(np.ptp(whole)), style.ROUNDING * largest):
-        middle, half = float(np.median(values)), 0.05 * largest or 1.0
+        middle = float(np.median(values))
+        half = 0.05 * largest or 1.0
         factor, unit = style.prefixed(abs(middle) + half, unit)
         limits = factor * (middle - half), factor * (middle + half)
         return Scaled(style.labelled(name, unit), unit, factor, limits=limits)
@@ -54,7 +56,8 @@ def scaled(variable: str, values: style.Array, whole: style.Array, also: float =
 
 def _centre(values: style.Array) -> float:
     """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
-    middle, width = 0.5 * float(values.min() + values.max()), float(np.ptp(values))
+    middle = 0.5 * float(values.min() + values.max())
+    width = float(np.ptp(values))
     if not 0.0 < width < CENTRED * abs(middle):
         return 0.0
     digits = math.ceil(math.log10(abs(middle) / width))

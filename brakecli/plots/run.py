@@ -33,7 +33,9 @@ FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
 FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
 FLATTENS = 4.0  # times the velocity of the shoe: a wheel that is faster is not drawn beside it
-HARMONICS, ROOM = 6.5, 1.3  # times its line, and times a wave or the last frequency that shows, a spectrum reaches
+# times its line, and times a wave or the last frequency that shows, a spectrum reaches
+HARMONICS = 6.5
+ROOM = 1.3
 FAINTEST = 1e-10  # of the largest density: what is below shows rounding
 SPARSE = 40  # samples, of which each has a dot
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
@@ -52,20 +54,24 @@ class RunPicture:
         if variable not in VARIABLES:
             problem = f"{argument('variable')} {variable}: a run has no such quantity"
             raise UsageError(f"{result.path}: {problem}; give one of {', '.join(VARIABLES)}")
-        self.variable, self.ordinate = variable, "vx" if variable == "x" else variable
+        self.variable = variable
+        self.ordinate = "vx" if variable == "x" else variable
         self.whole = "x" if variable == "vx" else variable
         stored = {name: "friction_force" if name == "torque" else name for name in ("x", self.ordinate, variable)}
-        variables, needed = result.variables("history"), ("time", "state", *stored.values())
+        variables = result.variables("history")
+        needed = ("time", "state", *stored.values())
         shapes = {variables[name].shape if name in variables else (0,) for name in needed}
         if len(shapes) != 1 or not (samples := max(shapes)[0]):
             raise style.unreadable(result, f"its history has no {', '.join(needed)} of equal length above 0")
         case = case_of(result).case
-        system, lever = system_of(case), {"torque": case.wheel.radius}
+        system = system_of(case)
+        lever = {"torque": case.wheel.radius}
 
         def read(name: str, first: int, stop: int) -> style.Array:
             return lever.get(name, 1.0) * result.read("history", stored.get(name, name), first, stop)
 
-        self.title, self.summary = case.title or "Case without a title", _summary(result.attributes)
+        self.title = case.title or "Case without a title"
+        self.summary = _summary(result.attributes)
         start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
         self.span = start, end  # s, of the whole run
         self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
@@ -74,7 +80,8 @@ class RunPicture:
         self.detail["belt"] = np.interp(self.detail["time"], system.belt["time"], system.belt["value"])
         wholes = {name: envelope(partial(read, name), samples) for name in {**stored, self.whole: ""}}
         self.envelope = start + self.interval * wholes["x"][0], *wholes[self.whole][1:]
-        fastest, moving = style.largest(self.detail["belt"]), style.largest(self.detail[self.ordinate])
+        fastest = style.largest(self.detail["belt"])
+        moving = style.largest(self.detail[self.ordinate])
         speed = fastest if self.ordinate == "vx" else 0.0
         self.near = self.ordinate == "vx" and (
             moving == 0.0 or fastest <= FLATTENS * moving
@@ -93,7 +100,8 @@ class RunPicture:
         fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
         self.resolution = result.attributes.get("frequency_resolution")  # Hz, not in older files
-        steady, fastest = np.ptp(system.belt["value"]) == 0.0, system.fastest_belt
+        steady = np.ptp(system.belt["value"]) == 0.0
+        fastest = system.fastest_belt
         self.passing = tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()  # Hz
         self.modes = _mode_frequencies(system)
         self.stop = Stop(result, system) if "spectrogram" in result.file else None
@@ -111,7 +119,8 @@ def _mode_frequencies(system: System) -> list[float]:
     """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
     if stability_seconds(system) + table_seconds(system) > WORTH_SAYING:
         return []
-    c, rest = system.coefficients, sliding(system)
+    c = system.coefficients
+    rest = sliding(system)
     found = modes(c, rest.stiffness if rest else system.contact_stiffness, c.grip(system.belt_speed))
     return sorted(mode.frequency for mode in found if mode.frequency > 0.0)
 
@@ -122,7 +131,8 @@ def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int
     Columns are equally wide; there are never more of them than samples. At most `BLOCK` samples are read at once.
     """
     columns = min(columns, samples)
-    lowest, highest = np.full(columns, np.inf), np.full(columns, -np.inf)
+    lowest = np.full(columns, np.inf)
+    highest = np.full(columns, -np.inf)
     for begin in range(0, samples, BLOCK):
         values = read(begin, min(begin + BLOCK, samples))
         column = np.arange(begin, begin + len(values)) * columns // samples
@@ -162,7 +172,8 @@ def _summary(attributes: dict[str, Any]) -> str:
     """Regime, excitation and numbers in one line."""
     if attributes.get("status") == "failed":
         return f"failed at {str(attributes.get('failure', '')).partition(';')[0]}"
-    regime, excitation = attributes.get("regime"), attributes.get("excitation")
+    regime = attributes.get("regime")
+    excitation = attributes.get("excitation")
     parts = [f"{regime}" if excitation == "none" else f"{regime}, {excitation}"]
     if regime == "undecided":
         parts[0] += f": {'; '.join(attributes.get('reasons', ()))}"
@@ -207,7 +218,9 @@ def draw(picture: RunPicture) -> Figure:
 
 
 def _draw_detail(axes: Axes, picture: RunPicture) -> None:
-    time, belt, interval = picture.detail["time"], picture.detail["belt"], picture.interval
+    time = picture.detail["time"]
+    belt = picture.detail["belt"]
+    interval = picture.interval
     look_of = picture.axes[picture.variable]
     axes.plot(time, look_of(picture.detail[picture.variable]), color=style.BLUE, marker=_marker(time))
     look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
@@ -224,8 +237,10 @@ def _draw_detail(axes: Axes, picture: RunPicture) -> None:
 
 
 def _draw_portrait(axes: Axes, picture: RunPicture) -> None:
-    along, up = picture.axes["x"], picture.axes[picture.ordinate]
-    x, y = along(picture.detail["x"]), up(picture.detail[picture.ordinate])
+    along = picture.axes["x"]
+    up = picture.axes[picture.ordinate]
+    x = along(picture.detail["x"])
+    y = up(picture.detail[picture.ordinate])
     marker = "o" if along.limits and up.limits else _marker(x)  # of a point
     axes.plot(x, y, color=style.BLUE, lw=0.9, marker=marker)
     stick = picture.detail["state"] == ContactState.STICK
@@ -278,7 +293,8 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     highest = min(frequency[-1], max([HARMONICS * (line or np.inf), *(ROOM * f for f in few)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
-    frequency, density = frequency[near], factor * density[near]
+    frequency = frequency[near]
+    density = factor * density[near]
     lowest = max(0.3 * float(density.min()), FAINTEST * float(density.max()))
     axes.semilogy(frequency, density, color=style.BLUE, lw=1.0, marker=_marker(frequency))
     right = min(highest, max(ROOM * float(frequency[density > lowest][-1]), 2.0 * (line or 0.0)))

@@ -8,8 +8,12 @@ from brakecli.files.read import StoredResult
 from brakecli.files.stability_fields import PROBABLE
 from brakecli.plots import style
 
-_WIDTH, _ROW, _BINS = 9.6, 0.36, 40  # inches; of a bar; bins of a histogram, at most
-_SQUEALS, _OTHERS = style.VERMILION, style.BLUE
+# inches; of a bar; bins of a histogram, at most
+_WIDTH = 9.6
+_ROW = 0.36
+_BINS = 40
+_SQUEALS = style.VERMILION
+_OTHERS = style.BLUE
 
 
 def draw(result: StoredResult) -> Figure:
@@ -20,11 +24,13 @@ def draw(result: StoredResult) -> Figure:
     shares = [
         style.read_column(result, name) for name in ("probability", "probability_lower", "probability_upper")
     ]
-    outcomes, indexed = [*map(str, result.read("/", "outcome"))], "total" in known and "parameter" in known
+    outcomes = [*map(str, result.read("/", "outcome"))]
+    indexed = "total" in known and "parameter" in known
     columns = _columns(result)
     if not len(outcomes) or any(each.shape != (len(outcomes),) for each in shares):
         raise style.unreadable(result, "its probabilities do not fit its outcomes")
-    attributes, rows = result.attributes, max(len(outcomes), 3)
+    attributes = result.attributes
+    rows = max(len(outcomes), 3)
     lines = (str(attributes.get(name, "")) for name in ("title", "sentence"))
     figure = style.headed(_WIDTH, 1.6 + _ROW * rows + 2.4, *lines, columns=2)
     upper, lower = style.panels(figure, 2, 2, height_ratios=[0.5 + _ROW * rows, 2.6])
@@ -42,11 +48,13 @@ def draw(result: StoredResult) -> Figure:
 
 def _columns(result: StoredResult) -> dict[str, tuple[style.Array, str]]:
     """The two numbers that are shown, and whose they are: critical friction, and how high it squeals or grows."""
-    found, known = dict[str, tuple[style.Array, str]](), result.variables("/")
+    found = dict[str, tuple[style.Array, str]]()
+    known = result.variables("/")
     squeals = style.read_column(result, "squeal") == 1 if "squeal" in known else np.zeros(0, np.bool_)
     for name in ("critical_friction", "frequency" if squeals.any() else "growth_rate", "amplitude"):
         if name in known and len(found) < 2:
-            values, only = style.read_column(result, name), name in ("frequency", "amplitude") and squeals.any()
+            values = style.read_column(result, name)
+            only = name in ("frequency", "amplitude") and squeals.any()
             if only and values.shape != squeals.shape:
                 raise style.unreadable(result, "its samples do not fit each other")
             values = values[squeals] if only else values

@@ -17,7 +17,8 @@ from brakecli.plots.run import case_of
 from brakecli.solver.period import common_period
 
 MOST = 200_000  # samples whose time is drawn, the last ones
-WAVE, KINDS = "wave", ("stick", "slip", "turn", "lift-off", "touch")
+WAVE = "wave"
+KINDS = ("stick", "slip", "turn", "lift-off", "touch")
 _WITH_THE_WHEEL = KINDS[:3]  # where vx is the wheel's speed
 _FEWEST = 8  # samples in a period between which a state is certain
 _STATE = ("x", "y", "vx", "vy")
@@ -38,7 +39,8 @@ def draw(result: StoredResult, section: str) -> Figure:
     if section == WAVE:
         points, where = _at_waves(result, time, begin)
     elif section in KINDS:
-        points, where = _at_events(result, section, begin), f"at each {section}"
+        points = _at_events(result, section, begin)
+        where = f"at each {section}"
     else:
         known = ", ".join((WAVE, *KINDS))
         raise UsageError(f"{argument('section')} {section}: there is no such section; give one of {known}")
@@ -72,7 +74,8 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
         )
     forced = result.attributes.get("forced_frequency")
     wave = np.argmin(np.abs(passing - forced)) if forced else np.argmax(np.abs(system.wheel.g))
-    frequency, (start, end, interval) = float(passing[wave]), time
+    frequency = float(passing[wave])
+    start, end, interval = time
     if frequency * interval > 1.0 / _FEWEST:
         what = f"samples every {interval:.3g} s do not resolve the wave of {frequency:.4g} Hz"
         raise UsageError(
@@ -82,9 +85,11 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
     times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1) / frequency
     if not len(times):
         raise UsageError(f"{argument('section')} {WAVE}: less than a period from {begin:.4g} s on; run longer")
-    places, parts = np.minimum((times - start) / interval, (end - start) / interval - 1.0).astype(int), []
+    places = np.minimum((times - start) / interval, (end - start) / interval - 1.0).astype(int)
+    parts = []
     for first in range(int(places[0]), int(places[-1]) + 1, BLOCK):
-        there, part = times[(places >= first) & (places < first + BLOCK)], (first, first + BLOCK + 1)
+        there = times[(places >= first) & (places < first + BLOCK)]
+        part = (first, first + BLOCK + 1)
         known, x, y, v_x, v_y = (result.read("history", name, *part) for name in ("time", *_STATE))
         curves = [CubicHermiteSpline(known, *each) for each in ((x, v_x), (y, v_y))]
         parts.append([curve(there, order) for order in (0, 1) for curve in curves])

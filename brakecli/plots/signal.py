@@ -43,7 +43,8 @@ def _title(source: str) -> str:
 
 
 def _draw_record(axes: Axes, look: SignalLook) -> None:
-    values, step = look.signal.values, look.signal.interval
+    values = look.signal.values
+    step = look.signal.interval
     factor, unit = style.prefixed(style.largest(values), MEASURED_UNITS[look.quantity])
     if len(values) > 2 * COLUMNS:
         places, low, high = envelope(lambda begin, end: values[begin:end], len(values))
@@ -53,7 +54,8 @@ def _draw_record(axes: Axes, look: SignalLook) -> None:
     for i, tone in enumerate(sorted(look.verdict.bursts, key=lambda tone: -tone.level)):
         axes.axvspan(tone.start, tone.end, color=style.ORANGE, alpha=0.25, lw=0, zorder=0.5)
         if i < _LABELLED:
-            centre, where = 0.5 * (tone.start + tone.end), axes.get_xaxis_transform()
+            centre = 0.5 * (tone.start + tone.end)
+            where = axes.get_xaxis_transform()
             axes.text(centre, 1.0, f"{tone.frequency:.4g} Hz", transform=where, ha="center", va="bottom", size=8)
     words = ", where a tone stands out shaded" if look.verdict.bursts else ""
     axes.set_title(f"Record{words}", pad=14.0)
@@ -63,7 +65,9 @@ def _draw_record(axes: Axes, look: SignalLook) -> None:
 
 def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     """Some cycles in the middle of the record, or of the burst that the verdict is about."""
-    velocity, m, step = look.velocity, look.smoothing, look.signal.interval
+    velocity = look.velocity
+    m = look.smoothing
+    step = look.signal.interval
     name, unit = _VELOCITY.get(look.quantity, ("velocity", "m/s"))
     smoothed = f", smoothed over {m} samples" * (m > 1)
     axes.set_title(f"{name.capitalize()}{smoothed}")
@@ -103,7 +107,8 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
 def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     from scipy.signal import welch
 
-    values, frequency = look.signal.values, look.verdict.frequency
+    values = look.signal.values
+    frequency = look.verdict.frequency
     good = np.flatnonzero(np.isfinite(values))
     filled = np.interp(np.arange(len(values)), good, values[good])
     size = segment(len(filled))

@@ -65,9 +65,15 @@ def _highest(stop: Stop, modes: list[float]) -> float:
 def draw_amplitude(axes: Axes, stop: Stop) -> None:
     """Amplitude of x against the wheel's speed, or the load where that alone changes; stick is marked."""
     factor, unit = style.prefixed(style.largest(stop.amplitude), "m")
-    along, name, its_unit, words = stop.speed, "speed", "m/s", "speed of the wheel's surface"
+    along = stop.speed
+    name = "speed"
+    its_unit = "m/s"
+    words = "speed of the wheel's surface"
     if np.ptp(along) <= 1e-9 * style.largest(along):
-        along, name, its_unit, words = stop.load, "load", "N", "load"
+        along = stop.load
+        name = "load"
+        its_unit = "N"
+        words = "load"
     axes.plot(along, factor * stop.amplitude, color=style.BLUE, lw=0.8, marker=".")
     stuck = stop.stick > 0.0
     look: dict[str, Any] = {"ls": "none", "marker": "s", "ms": 4.0, "color": style.ORANGE, "label": "with stick"}

@@ -26,7 +26,11 @@ from brakecli.files.write import FILL
 Array = NDArray[Any]
 
 # The colours of Okabe and Ito, which people who do not see red or green can tell apart.
-BLUE, ORANGE, VERMILION, GREEN, GREY = "#0072B2", "#E69F00", "#D55E00", "#009E73", "#9A9A9A"
+BLUE = "#0072B2"
+ORANGE = "#E69F00"
+VERMILION = "#D55E00"
+GREEN = "#009E73"
+GREY = "#9A9A9A"
 DARK = "#333333"
 NARROW = 4.6  # inches
 DASHES: tuple[int, tuple[float, ...]] = 0, (5, 3)  # offset, and lengths on and off in turns
@@ -94,9 +98,11 @@ def headed(width: float, height: float, title: str, *lines: str, columns: int = 
     The lines are wrapped to the width; the height counts one line for each.
     """
     if is_narrow():
-        width, height = NARROW, 0.85 * height * columns
+        width = NARROW
+        height = 0.85 * height * columns
     title = title if matplotlib.rcParams["figure.titlesize"] else ""
-    bold, plain = {"size": 13, "weight": "bold"}, {"size": 10.0, "color": "#444444"}
+    bold = {"size": 13, "weight": "bold"}
+    plain = {"size": 10.0, "color": "#444444"}
     wrapped = [
         (step, text, look)
         for line, letters, step, look in (
@@ -106,7 +112,8 @@ def headed(width: float, height: float, title: str, *lines: str, columns: int = 
         for text in textwrap.wrap(line, round(letters * width), max_lines=6, placeholder=" …") or [""]
     ]
     height += sum(step for step, *_ in wrapped) - 0.29 - 0.21 * len(lines)
-    figure, below = Figure(figsize=(width, height)), 0.16
+    figure = Figure(figsize=(width, height))
+    below = 0.16
     for step, text, look in wrapped:
         text = text.strip(" ·")  # what stands between two parts does not end a line
         figure.text(0.125 / width, 1.0 - below / height, text, look, va="top", parse_math=False)
@@ -215,7 +222,8 @@ def set_ticks(axis: Axis, low: float, high: float, unit: str = "", name: str = "
     The label, if there is a name, has the unit of the numbers at the ticks: with a prefix where they need one.
     """
     logarithmic = axis.get_scale() == "log"
-    largest, digits = max(abs(low), abs(high)), digits_of(max(abs(low), abs(high)), 0.1 * (high - low))
+    largest = max(abs(low), abs(high))
+    digits = digits_of(max(abs(low), abs(high)), 0.1 * (high - low))
     factor, unit = (1.0, unit) if logarithmic and unit == "Hz" else prefixed(largest, unit)
     if name:
         axis.set_label_text(labelled(name, unit), parse_math=False)
@@ -230,9 +238,11 @@ def set_ticks(axis: Axis, low: float, high: float, unit: str = "", name: str = "
 
 def widen(axes: Axes, values: Array) -> None:
     """Fit the axis to the values, and keep those that differ too little in its middle."""
-    low, high = np.nanmin(values), np.nanmax(values)
+    low = np.nanmin(values)
+    high = np.nanmax(values)
     if high - low < _ALIKE * abs(high + low) / 2.0:
-        middle, half = 0.5 * (high + low), 0.25 * _ALIKE * abs(high + low)
+        middle = 0.5 * (high + low)
+        half = 0.25 * _ALIKE * abs(high + low)
         axes.set_ylim(middle - half, middle + half)
     else:
         room = 0.08 * (high - low)
@@ -250,7 +260,8 @@ def keep_flat(axes: Axes, values: Array, scale: float = 0.0) -> None:
     known = values[np.isfinite(values)]
     size = max(largest(known), scale)
     if known.size and float(np.ptp(known)) <= ROUNDING * size:
-        middle, half = float(np.median(known)), 0.05 * (size or 1.0)
+        middle = float(np.median(known))
+        half = 0.05 * (size or 1.0)
         axes.set_ylim(middle - half, middle + half)
 
 

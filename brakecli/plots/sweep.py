@@ -24,7 +24,8 @@ REGIMES = {  # colour and marker
     Regime.UNDECIDED: ("#7A7A7A", "X"),  # in grey, between orange and blue
 }
 MARGIN = "margin"  # critical friction less friction, where the picture shows its zero
-FORCED, DIFFERENT = "forced by the wheel's waves", "up and down differ"
+FORCED = "forced by the wheel's waves"
+DIFFERENT = "up and down differ"
 CRITICAL_LINE = "critical friction"
 UNKNOWN = "no attractor known"
 _FEW = 60  # points up to which each has a marker of full size
@@ -32,7 +33,8 @@ MOST_NAMED = 12  # attractors in the legend: the first of them
 _FORMS = "osD^vPh*<>"  # markers of attractors, in turn
 WIDTH = 8.8  # inches, of a figure with one column of panels
 MOST_PANELS = 5  # values of a third axis: its maps stand side by side
-FORCED_PART, ATTRACTOR = "amplitude_forced", "attractor"
+FORCED_PART = "amplitude_forced"
+ATTRACTOR = "attractor"
 _FIRST = (*map(str, REGIMES), "by simulation", "with its error bar", "by eigenvalues")  # in the legend
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
@@ -136,7 +138,8 @@ class SweepPicture:
     def differs(self) -> style.Array:
         """Where the least sustained value lies outside the bracket of the critical one, or where there is none."""
         assert self.critical is not None
-        sustained, tolerance = self["critical_sustained"], self.critical.tolerance
+        sustained = self["critical_sustained"]
+        tolerance = self.critical.tolerance
         early = self["critical_lower"] - sustained > tolerance  # false where one of the two is missing
         late = sustained - self["critical_upper"] > tolerance
         return np.asarray(np.isfinite(sustained) & (early | late | np.isnan(self["critical"])))
@@ -148,8 +151,10 @@ class SweepPicture:
     def missing(self) -> Iterator[Sign]:
         """Points without a critical value, or without a least sustained one, by the reason."""
         assert self.critical is not None
-        status, sustained = self["critical_status"], self["sustained_status"]
-        low, high = style.readable(self.critical.lower), style.readable(self.critical.upper)
+        status = self["critical_status"]
+        sustained = self["sustained_status"]
+        low = style.readable(self.critical.lower)
+        high = style.readable(self.critical.upper)
         always = (sustained == Outcome.SUSTAINED) & (status != Outcome.UNSTABLE)
         never = (sustained == Outcome.DAMPED) & (status != Outcome.STABLE)
         yield sign(status == Outcome.STABLE, f"stable up to {high}", "^", style.BLUE, "white")

@@ -15,7 +15,9 @@ from brakecli.plots.lock_in import FEW
 from brakecli.plots.quantities import VARIABLES, scaled
 from brakecli.plots.run import FAINTEST, HARMONICS, RunPicture
 
-_WIDTH, _COLUMNS = 9.4, 100  # inches; of an envelope
+# inches; of an envelope
+_WIDTH = 9.4
+_COLUMNS = 100
 _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the thin dashed one, also in grey
     {"color": "#7DB9DE", "lw": 3.2, "ls": "-"},
     {"color": style.VERMILION, "lw": 1.2, "ls": style.DASHES},
@@ -56,7 +58,8 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str, names: Sequ
     label = label.removeprefix("power spectral ") if style.is_narrow() else label
     for number, (name, picture, curve) in enumerate(zip(names, pictures, _LOOKS, strict=True)):
         panels[0].plot(times[number], look(picture.detail[variable]), label=_plain(name), **curve)
-        time, lowest, highest = envelopes[number][0], *map(whole_look, envelopes[number][1:])
+        time, *bounds = envelopes[number]
+        lowest, highest = map(whole_look, bounds)
         if number == 0:
             panels[1].fill_between(time, lowest, highest, color=curve["color"], lw=1.5)
         else:
@@ -80,9 +83,11 @@ def _runs(results: tuple[StoredResult, StoredResult], variable: str, names: Sequ
 
 def _wider(picture: RunPicture) -> list[style.Array]:
     """An envelope of fewer columns, so that each holds a cycle or more; the last one reaches to the end."""
-    (time, lowest, highest), end = picture.envelope, picture.span[1]
+    time, lowest, highest = picture.envelope
+    end = picture.span[1]
     first = np.arange(0, len(time), max(1, len(time) // _COLUMNS))
-    low, high = np.minimum.reduceat(lowest, first), np.maximum.reduceat(highest, first)
+    low = np.minimum.reduceat(lowest, first)
+    high = np.maximum.reduceat(highest, first)
     return [np.append(time[first], end), np.append(low, low[-1]), np.append(high, high[-1])]
 
 

@@ -19,7 +19,9 @@ from brakecli.sweeps.result import unit
 Numbers = Mapping[str, tuple[Any, str]]
 """What two results are compared by: values with their units, by their names."""
 
-_COLOURS, _DPI = 255, 120  # of a picture: a third of the bytes, and no difference that could be seen
+# of a picture: a third of the bytes, and no difference that could be seen
+_COLOURS = 255
+_DPI = 120
 
 
 @dataclass(frozen=True)

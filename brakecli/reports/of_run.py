@@ -33,9 +33,13 @@ from brakecli.sweeps.result import unit
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
 MARGIN = 0.2  # of the friction, that advice aims at
-BEYOND, MOST_BEYOND = 1.5, 4.0  # up to which that reaches: critical or own friction, and own friction at most
+# up to which that reaches: critical or own friction, and own friction at most
+BEYOND = 1.5
+MOST_BEYOND = 4.0
 VALUES = 121  # of the friction in the lock-in diagram
-MOST_SENSITIVE, MOST_CHANGES = 6, 5  # keys that are shown; the latter on the first page
+# keys that are shown; the latter on the first page
+MOST_SENSITIVE = 6
+MOST_CHANGES = 5
 MOST_SECONDS = 60.0  # what it may take to ask all
 _UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
@@ -57,7 +61,8 @@ _ACCURACY = (
 
 def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
-    found, loaded = result.attributes, case_of(result)
+    found = result.attributes
+    loaded = case_of(result)
     advice = advise(loaded, KEYS, MARGIN, progress, most=MOST_SECONDS)
     again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
     left_out = _sentences("left out: ", found.get("left_out", ()))
@@ -77,10 +82,12 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     ]
     theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
     answer = [*stretches, _sentence(found), theory]
-    name, title = escaped(result.path.name), loaded.case.title or "Case without a title"
+    name = escaped(result.path.name)
+    title = loaded.case.title or "Case without a title"
     numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
     numbers = {**numbers, **numbers_of(named(ADVICE, "critical_friction", "margin"), advice.numbers())}
-    drawn, change = picture(PICTURE, partial(draw, result)), [*_to_change(advice, found.get("regime"))]
+    drawn = picture(PICTURE, partial(draw, result))
+    change = [*_to_change(advice, found.get("regime"))]
     return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions)
 
 
@@ -126,7 +133,8 @@ def case_blocks(loaded: LoadedCase) -> list[Any]:
     keys = {key: value for key, value in flat(loaded.case.model_dump(mode="json")) if value not in (None, [])}
     del keys["title"]
     rows = [(key, shown(value, unit(key)), _meaning(key)) for key, value in keys.items()]
-    idle, head = [row for row in rows if row[0].startswith(_IDLE)], ("key", "value", "meaning")
+    idle = [row for row in rows if row[0].startswith(_IDLE)]
+    head = ("key", "value", "meaning")
     shoe = Table([row for row in rows if row not in idle], head)
     return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
 
@@ -142,7 +150,8 @@ def _sentence(found: Mapping[str, Any]) -> str:
     """What the run has shown."""
     if found.get("status") == "failed":
         return f"The run failed: {found.get('failure', '')}."
-    regime, numbers = found.get("regime"), []
+    regime = found.get("regime")
+    numbers = []
     reasons = "; ".join(_reasons(found))
     words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
     if regime == Regime.DAMPED and found.get("excitation") == Excitation.FORCED:
@@ -170,7 +179,8 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
     report = advice.stability
     rows = [("steady sliding", "none", report.no_equilibrium or "")] if report.equilibrium is None else []
     for each in report.crossings:
-        change, how = "lost" if each.lost else "regained", f"by {each.instability}, {shown(each.frequency, 'Hz')}"
+        change = "lost" if each.lost else "regained"
+        how = f"by {each.instability}, {shown(each.frequency, 'Hz')}"
         rows.append((f"stability {change}", f"at φ = {each.friction:.6g}", how))
     if (least := advice.thresholds.coexists_from) is not None:
         rows.append(("a vibration can exist", f"from φ = {least:.6g} on", "beside stable sliding"))
@@ -198,14 +208,16 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
 
 def _diagram(advice: AdviceReport) -> Figure:
     """Modes over the friction coefficient, to half more than what matters."""
-    report, c = advice.stability, advice.system.coefficients
+    report = advice.stability
+    c = advice.system.coefficients
     highest = BEYOND * max(report.friction, advice.critical_friction or 0.0) or 1.0
     if highest > MOST_BEYOND * report.friction > 0.0:
         highest = MOST_BEYOND * report.friction
     phi = np.linspace(0.0, highest, VALUES)
 
     def at(friction: float) -> tuple[Mode, ...]:
-        k, grip = report.stiffness_at(friction), math.copysign(friction, report.belt_speed)
+        k = report.stiffness_at(friction)
+        grip = math.copysign(friction, report.belt_speed)
         return tuple(modes(c._replace(phi=friction), k, grip)) if k > 0.0 else ()
 
     pairs = followed(map(at, phi.tolist()))
@@ -228,7 +240,8 @@ def _regime(result: StoredResult) -> list[Any]:
         for name, value in sorted(evidence.items())
     ]
     reasons = Texts(_sentences("", _reasons(found)))
-    intervals, head = _vibrations(result), [each.meaning for each in fields.VIBRATION]
+    intervals = _vibrations(result)
+    head = [each.meaning for each in fields.VIBRATION]
     beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
     shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the table decided")
     return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]

@@ -108,7 +108,8 @@ def part_of_sweep(result: StoredResult) -> Part:
     table = Table(accuracy or [("error", "not estimated")], ("number", "largest"))
     sections.append(Section("Accuracy", [table]))
     failed = np.ravel(np.asarray(result.read("/", "status")) != Status.DONE)
-    reasons, warned = np.ravel(result.read("/", "reason")), np.ravel(result.read("/", "warning"))
+    reasons = np.ravel(result.read("/", "reason"))
+    warned = np.ravel(result.read("/", "warning"))
     lines = [f"Failed: {reason}." for reason in dict.fromkeys(reasons[failed].tolist())][:MOST_FAILURES]
     lines += [f"{warning}." for warning in dict.fromkeys(warned[warned != ""].tolist())][:MOST_FAILURES]
     sections.append(Section("Warnings", [Texts(lines or ["There are none."])]))
@@ -117,10 +118,16 @@ def part_of_sweep(result: StoredResult) -> Part:
 
 def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
     """What the points say, and at which of them the most and the least; and the numbers of that."""
-    done, name, words, end = found["status"] == Status.DONE, "amplitude", "largest amplitude", np.nanargmax
+    done = found["status"] == Status.DONE
+    name = "amplitude"
+    words = "largest amplitude"
+    end = np.nanargmax
     if found.critical is not None:
-        name, words, end = "critical", "least critical value", np.nanargmin
-    size, values = done.size, found[name]
+        name = "critical"
+        words = "least critical value"
+        end = np.nanargmin
+    size = done.size
+    values = found[name]
     numbers: dict[str, tuple[Any, str]] = {"points": (size, "1")}
     if found.critical is None:
         lasting = np.isin(found["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
@@ -156,7 +163,8 @@ def part_of_other(result: StoredResult) -> Part:
         for each in declared.get(kind, fields.COMPARISON)
         if each.name not in apart and each.in_file
     ]
-    tables, numbers = [Table(PAGE.rows(known, result.attributes))], numbers_of(known, result.attributes)
+    tables = [Table(PAGE.rows(known, result.attributes))]
+    numbers = numbers_of(known, result.attributes)
     drawn = picture(_PICTURES[kind], partial(draw, result))
     answer = ["No entry meets the wanted error."]
     if kind == "stability":
@@ -233,7 +241,8 @@ def _unit_of_key(result: StoredResult) -> str:
 
 def _range(result: StoredResult, kind: str) -> str:
     """The key, or keys, along which a result was computed, with both ends, as an option of its command."""
-    key, ends = str(result.attributes.get("parameter", "")), list[Any]()
+    key = str(result.attributes.get("parameter", ""))
+    ends = list[Any]()
     if kind == "branch":
         ends = [result.attributes.get(name, 0.0) for name in ("lower", "upper")]
     if kind == "stability":
@@ -245,7 +254,8 @@ def _range(result: StoredResult, kind: str) -> str:
 
 def _special(result: StoredResult) -> Table:
     """The special points of all branches."""
-    rows, groups = list[tuple[str, ...]](), [each for each in result.groups if each.endswith("/special")]
+    rows = list[tuple[str, ...]]()
+    groups = [each for each in result.groups if each.endswith("/special")]
     for group in sorted(groups, key=lambda each: (len(each), each)):  # branch_10 comes after branch_9
         branch = group.removesuffix("/special")
         which = f"{branch.replace('_', ' ')}, {result.group_attributes(branch).get('kind', '')}"
@@ -257,10 +267,8 @@ def _rows(result: StoredResult, group: str, known: Iterable[Field]) -> list[tupl
     """The variables of a group, a row for each place along them."""
     columns = []
     for each in known:
-        values, missing = (
-            result.read(group, each.name).tolist(),
-            (FILL, 0.0) if each.name in _NONE_AT_0 else (FILL,),
-        )
+        values = result.read(group, each.name).tolist()
+        missing = (FILL, 0.0) if each.name in _NONE_AT_0 else (FILL,)
         units = style.unit_of(result.variables(group)[each.name].attributes)
         columns.append(["–" if value in missing else shown(rounded(value, 5), units) for value in values])
     if len({*map(len, columns)}) != 1:
@@ -278,14 +286,17 @@ def _plain(
     question: str = "",
 ) -> Part:
     """A part with what is said of every result."""
-    loaded, attributes = case_of(result), result.attributes
+    loaded = case_of(result)
+    attributes = result.attributes
     given = str(attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", ""))
     again = repeat(result, f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5", given)
     again += [Texts(["CASE.toml holds the whole case, which stands above as a file."])] * (
         "CASE" in _COMMANDS[kind]
     )
     sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
-    title, name = str(attributes.get("title", "")) or "Result without a title", escaped(result.path.name)
-    asks, what = question or _QUESTIONS[kind], "This names the keys of such a case to change, and to which values:"
+    title = str(attributes.get("title", "")) or "Result without a title"
+    name = escaped(result.path.name)
+    asks = question or _QUESTIONS[kind]
+    what = "This names the keys of such a case to change, and to which values:"
     change = [Texts([what]), Code(_ADVISE[kind])] if kind in _ADVISE else []
     return Part(name, title, asks, answer, drawn, change, sections, numbers, result.versions)

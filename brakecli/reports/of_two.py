@@ -11,7 +11,9 @@ from brakecli.plots import two
 from brakecli.reports.blocks import Pair, Part, Table, Texts, key_unit, percent, picture, rounded, shown
 
 PICTURE = "Both results in one picture, the first one wide, the second one dashed"
-DIGITS, MOST_PART = 4, 10.0  # to which numbers are compared; increase above which there is no per cent
+# to which numbers are compared; increase above which there is no per cent
+DIGITS = 4
+MOST_PART = 10.0
 _NAMED = 2  # changed keys by which the results are named
 _CHOSEN = "solver.duration", "output.sample_interval"  # by the program, where a file gives no numbers
 _SAME = "same"
@@ -25,7 +27,8 @@ def pair_of(results: tuple[StoredResult, StoredResult], parts: Sequence[Part]) -
     a, b = parts
     given = [keys(result, ("case_toml",)) for result in results]
     fixed = [name for name in _CHOSEN if any(isinstance(each.get(name), int | float) for each in given)]
-    case, chosen = list[tuple[Any, ...]](), list[str]()
+    case = list[tuple[Any, ...]]()
+    chosen = list[str]()
     for name, *values in (each.values() for each in changed(*map(keys, results))):
         texts = [shown(value, key_unit(name)) for value in values]
         if name in _CHOSEN and name not in fixed:
@@ -43,7 +46,8 @@ def pair_of(results: tuple[StoredResult, StoredResult], parts: Sequence[Part]) -
         pictures = [picture(PICTURE, partial(two.draw, results, "", names))]
     except UsageError:  # no curves that could be drawn over each other
         pictures = [each.picture for each in parts if each.picture]
-    title, titles = f"{a.title} – {b.title}", [a.title, b.title]
+    title = f"{a.title} – {b.title}"
+    titles = [a.title, b.title]
     if a.title == b.title:
         steps = [f"{name} {shown(one, units)} → {shown(other, units)}" for name, one, other, units in single]
         title = f"{a.title}: {', '.join(steps) or ' – '.join(names)}"

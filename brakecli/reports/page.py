@@ -45,7 +45,8 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)
 
     with new_output(target, force=force) as file:
-        parts, pair = [], None
+        parts = []
+        pair = None
         for number, result in enumerate(results):
             progress("results", number, len(results))
             with open_result(result) as stored:

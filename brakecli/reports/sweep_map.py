@@ -18,8 +18,12 @@ from brakecli.reports.blocks import shown
 
 MOST = 10_000  # points whose values are on the page
 _WORDY = 2000  # up to here with the reasons, and with five digits
-WIDTH, HEIGHT = 400.0, 260.0  # of the cells, in units of the drawing; a row alone is lower
-_TICKS, _SHADES, _NONE = 7, 32, "#f2f2f2"
+# of the cells, in units of the drawing; a row alone is lower
+WIDTH = 400.0
+HEIGHT = 260.0
+_TICKS = 7
+_SHADES = 32
+_NONE = "#f2f2f2"
 _LETTERS = {Regime.RELAXATION: "R", Regime.QUASI_HARMONIC: "Q", Regime.UNDECIDED: "?"}  # colours are alike in grey
 _LEAST_LETTER = 11.0  # of a cell that holds a letter
 
@@ -75,8 +79,10 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
     found: dict[str, list[str]] = {}
     letters = []
     for i, j in product(*map(range, shape)):
-        left, right, one, other = *x.edges[i : i + 2], *y.edges[j : j + 2]
-        low, high = min(one, other), max(one, other)
+        left, right = x.edges[i : i + 2]
+        one, other = y.edges[j : j + 2]
+        low = min(one, other)
+        high = max(one, other)
         cell = f"M{left:.4g} {low:.4g}H{right:.4g}V{high:.4g}H{left:.4g}z"
         found.setdefault(colours.reshape(shape)[i, j], []).append(cell)
         letter = _LETTERS.get(picture["regime"].reshape(shape)[i, j], "") if picture.critical is None else ""
@@ -84,7 +90,8 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
             letters.append((0.5 * (left + right), 0.5 * (low + high) + 4.0, letter))
     columns = {}
     for name in names:
-        values, unit = picture[name].reshape(shape), picture.units.get(name, "")
+        values = picture[name].reshape(shape)
+        unit = picture.units.get(name, "")
         columns[name.replace("_", " ")] = _numbers(values, unit) if values.dtype.kind in "iuf" else _texts(values)
     data = {"x": x.edges, "y": y.edges, "xs": x.values, "ys": y.values, "names": [x.label, y.label]}
     data["columns"] = columns
@@ -111,7 +118,8 @@ def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]
         present = [name for name in known if (regimes == name).any()]
         legend = [(known[name], name or "failed") for name in present]
         return np.vectorize(known.get, otypes=[object])(regimes), legend
-    values, shades = picture["critical"], colormaps["cividis"]
+    values = picture["critical"]
+    shades = colormaps["cividis"]
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if there.size else (0.0, 1.0)
     level = np.round(np.nan_to_num((values - low) / ((high - low) or 1.0)) * (_SHADES - 1)) / (_SHADES - 1)

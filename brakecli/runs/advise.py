@@ -25,8 +25,11 @@ from brakecli.runs.settled import Judged, settled
 from brakecli.solver.motion import Counted, Motion
 from brakecli.solver.system import System
 
-CHECK_SECONDS, _CHECK_SAMPLES = 5.0, 1_000_000  # of a run that checks, which is cut short beyond
-_DECAYED, _DECAYED_SAMPLES = 15.0, 100_000
+# of a run that checks, which is cut short beyond
+CHECK_SECONDS = 5.0
+_CHECK_SAMPLES = 1_000_000
+_DECAYED = 15.0
+_DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
 _ALL_CHECKS_SECONDS = 10.0  # estimated time of all runs that check after which no more is begun
@@ -62,7 +65,8 @@ class AdviceReport:
     @property
     def margin(self) -> float | None:
         """The critical friction over the case's own, less 1; None without one of the two."""
-        critical, own = self.critical_friction, self.stability.friction
+        critical = self.critical_friction
+        own = self.stability.friction
         return critical / own - 1.0 if critical is not None and own > 0.0 else None
 
     @property
@@ -85,7 +89,8 @@ class AdviceReport:
 
     def notes(self) -> list[str]:
         """What the answer rests on."""
-        rest, found = self.stability.equilibrium, []
+        rest = self.stability.equilibrium
+        found = []
         if rest is not None and 0.0 < rest.contact_fraction < 1.0:
             instead = 'a sweep with method = "simulation" follows the motion itself'
             found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
@@ -98,7 +103,9 @@ class AdviceReport:
         return found
 
     def _state(self) -> Iterator[str]:
-        report, critical, own = self.stability, self.critical_friction, self.stability.friction
+        report = self.stability
+        critical = self.critical_friction
+        own = self.stability.friction
         if report.belt_speed == 0.0:
             yield "the wheel stands, so that nothing slides: give wheel.angular_speed"
             return
@@ -130,12 +137,14 @@ class AdviceReport:
         if best.to is None:
             yield f"no key alone gives a margin of {100.0 * self.wanted_margin:.3g} %"
             return
-        critical, effect = best.critical_friction, "takes the instability away"
+        critical = best.critical_friction
+        effect = "takes the instability away"
         if critical is not None:
             effect = f"makes it stable up to a friction of {critical:.3g}"
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
         if self.squeal and best.squeal:
-            own, left = self.squeal.squeal_probability, best.squeal.squeal_probability
+            own = self.squeal.squeal_probability
+            left = best.squeal.squeal_probability
             yield f"under scatter {left:.2%} of such brakes squeal in place of {own:.2%}"
         if best.check is None:
             yield "no run has checked that"
@@ -151,7 +160,8 @@ def _far(margin: float | None, own: float) -> str:
         return ""
     if margin > _TIMES:
         return f", {margin + 1.0:.3g} times the case's {own:g}"
-    part, where = 100.0 * abs(margin), "above" if margin > 0.0 else "below"
+    part = 100.0 * abs(margin)
+    where = "above" if margin > 0.0 else "below"
     return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
@@ -169,12 +179,16 @@ def advise(
     A case that has the margin (a part of its friction) needs no advice; what takes more than `most` seconds is
     left out. Raises UsageError.
     """
-    case, advice = loaded.case, list[Change]()
-    keys, everything = of_case.advised_keys(case, patterns), of_case.numbers(case)
+    case = loaded.case
+    advice = list[Change]()
+    keys = of_case.advised_keys(case, patterns)
+    everything = of_case.numbers(case)
     system = system_of(case)
-    report, found = stability(system), of_case.answer(case)
+    report = stability(system)
+    found = of_case.answer(case)
     critical = found.critical if found else None
-    sensitivities, left_out = list[Sensitivity](), ""
+    sensitivities = list[Sensitivity]()
+    left_out = ""
     if (seconds := advise_seconds(loaded)) > most:
         left_out = f"what to change is left out: `brakecli advise` takes about {duration_text(seconds)}"
     else:
@@ -198,12 +212,14 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
 
     Runs are made for small changes first.
     """
-    checks, spent = dict[str, CheckRun](), 0.0
+    checks = dict[str, CheckRun]()
+    spent = 0.0
     for each in sorted(advice, key=lambda each: each.size):
         if each.to is None or spent > _ALL_CHECKS_SECONDS or (part := _to_check(case, each)) is None:
             continue
         system, seconds = part
-        checks[each.parameter], spent = _checked(system, each, progress), spent + seconds
+        checks[each.parameter] = _checked(system, each, progress)
+        spent = spent + seconds
     regimes = {key: str(check.verdict.regime) for key, check in checks.items()}
     places: dict[str | None, int] = {Regime.DAMPED: 0, Regime.UNDECIDED: 1, None: 1}
 
@@ -221,7 +237,8 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
     there = of_case.changed(case, key_path(change.parameter), float(change.rounded))
     if there is None:
         return None
-    system, found = system_of(there), of_case.answer(there, 0.0)
+    system = system_of(there)
+    found = of_case.answer(there, 0.0)
     seconds = guessed(system).seconds
     decays = -found.growth if found and found.growth and system.steady else 0.0
     long = min(_DECAYED / (decays * system.duration), _DECAYED_SAMPLES / system.samples) if decays > 0.0 else 1.0
@@ -238,5 +255,6 @@ def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
         return judged_in_memory(part, lambda done: progress(f"{what} of the check", done, total))
 
     ended = settled(asked(system), run)
-    spent, duration = time.perf_counter() - start, ended.system.sampled_duration
+    spent = time.perf_counter() - start
+    duration = ended.system.sampled_duration
     return CheckRun(change.parameter, float(change.rounded), ended.judged.verdict, duration, spent)

@@ -132,7 +132,8 @@ def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> N
             continue
         own = replace(own, kind="i8") if field.kind == "?" else own
         result.column(own, ("point",), [1 * getattr(point, field.name) for point in found.points], group)
-    inner, marks = f"{group}/special", found.special
+    inner = f"{group}/special"
+    marks = found.special
     result.axis(inner, integer("special", "number of the special point"), range(len(marks)))
     for field in fields.SPECIAL:
         own = replace(field, units=units or "1") if field.units == "of the key" else field

@@ -94,7 +94,9 @@ class Apart:
 
 def displacement(system: System) -> tuple[float, float]:
     """How far from its start (m) another rounding of it may lie."""
-    c, initial, load = system.coefficients, system.initial, float(np.abs(system.load["value"]).max())
+    c = system.coefficients
+    initial = system.initial
+    load = float(np.abs(system.load["value"]).max())
     heights = sum(float(np.abs(each.g).sum()) for each in (system.shoe, system.wheel))
     pressed = load / (c.c_yy + system.contact_stiffness) + heights
     pulled = load * (abs(c.sin_beta) + c.phi) / c.c_xx if initial.from_equilibrium and c.c_xx > 0.0 else 0.0
@@ -108,7 +110,8 @@ def replica(system: System) -> System:
     motion makes of it: a shoe that is put on an unstable equilibrium stays there in all of them. What a run
     differs by from its replica is rounding times the amplification of the motion.
     """
-    (x, y), initial = displacement(system), system.initial
+    x, y = displacement(system)
+    initial = system.initial
     return replace(system, initial=replace(initial, x=initial.x + x, y=initial.y + y))
 
 

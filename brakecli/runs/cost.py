@@ -16,16 +16,31 @@ from brakecli.solver.system import System
 _STEP_SECONDS = 1.5e-7
 _NODE_SECONDS = 5e-10  # per node, and again per node and wave of the wheel:
 _NODE_WAVE_SECONDS = 1.5e-10
-_WINDOW_WAVES, _POINT_WAVE_SECONDS = 3, 3e-10  # with a window: as many waves; to fill it, per point and wave
-_TERM_SECONDS, _PAIR_SECONDS = 2.5e-8, 5e-10  # exact, for each wave on the pad: per harmonic, and per pair of them
-_PAIRS, _OWN_PAIRS = 20.0, 80.0  # of waves in full contact, which take as long as the rest of a step
+# with a window: as many waves; to fill it, per point and wave
+_WINDOW_WAVES = 3
+_POINT_WAVE_SECONDS = 3e-10
+# exact, for each wave on the pad: per harmonic, and per pair of them
+_TERM_SECONDS = 2.5e-8
+_PAIR_SECONDS = 5e-10
+# of waves in full contact, which take as long as the rest of a step
+_PAIRS = 20.0
+_OWN_PAIRS = 80.0
 _EVALUATIONS = 1.5  # of the contact in a step
-_OWN_STEPS, _AT = 25.0, 1e-10  # in a period, of a scheme that finds them itself, at this tolerance
+# in a period, of a scheme that finds them itself, at this tolerance
+_OWN_STEPS = 25.0
+_AT = 1e-10
 _ORDER = 8  # of these steps
-_STEPS_PER_WAVE, _DECAY = 8.0, 4.0  # such steps for a passing wave, and decay rate times such a step
-_FINER, FINEST, _COARSEST = 1e-5, 1e-13, 1e-8  # tolerance of steps over that of histories, and its bounds
+# such steps for a passing wave, and decay rate times such a step
+_STEPS_PER_WAVE = 8.0
+_DECAY = 4.0
+# tolerance of steps over that of histories, and its bounds
+_FINER = 1e-5
+FINEST = 1e-13
+_COARSEST = 1e-8
 _RUNS = 1.6  # where histories keep a tolerance
-_PRESSED, _PLAYS = 0.01, 0.12  # part of the time in which a pad is open in part: under load, and elsewhere
+# part of the time in which a pad is open in part: under load, and elsewhere
+_PRESSED = 0.01
+_PLAYS = 0.12
 _OWN_STEP_SECONDS = 4e-6
 _OWN_EVALUATIONS = 27.0
 _EXACT_STEP_SECONDS = 1e-7  # events included
@@ -34,7 +49,9 @@ _TABLE_SECONDS = 4e-9  # to fill a byte of the tables of the contact
 # Beside the loop, measured on runs of 4 to 15 million samples: 0.6 to 0.8 µs of processor time for the file, the
 # spectra and the verdict, most of it to compress the file; and the peak of memory where histories are held.
 _SAMPLE_SECONDS = 8e-7
-_HELD, _HELD_EXACT = 4.0, 2.0  # histories: two with what compares them, or one while it is joined
+# histories: two with what compares them, or one while it is joined
+_HELD = 4.0
+_HELD_EXACT = 2.0
 
 
 class Price(NamedTuple):
@@ -47,18 +64,21 @@ class Price(NamedTuple):
 
 def guessed(system: System) -> Price:
     """A rough guess at what a case costs, without its file and its verdict."""
-    method, pairs = system.method, 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
+    method = system.method
+    pairs = 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
         each = _STEP_SECONDS * (1.0 + pairs / _PAIRS)
         if system.finds_patches or system.nodes:
             each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
         window = _window_seconds(system, system.sampled_duration * system.fastest_belt)
         return Price(system.steps, system.steps * each + window)
-    c, alone = system.coefficients, method.step is not None
+    c = system.coefficients
+    alone = method.step is not None
     if method.row.exact:
         return Price(system.steps, system.steps * _EXACT_STEP_SECONDS)
     tolerance = method.tolerance if alone else max(min(_FINER * method.tolerance, _COARSEST), FINEST)
-    fastest, start = system.natural_frequencies[1], system.initial
+    fastest = system.natural_frequencies[1]
+    start = system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
     rate = max(fastest * _OWN_STEPS * (_AT / tolerance) ** (1.0 / _ORDER), 0.5 * math.sqrt(bound / c.m))
     swing = 2.0 * math.pi * fastest * (abs(start.x) + abs(start.y)) + abs(start.vx) + abs(start.vy)
@@ -118,7 +138,8 @@ def _opens(system: System, phi: float) -> bool:
     """Whether the pad may touch in part in steady sliding."""
     if system.smooth:
         return False
-    pad, opens = system.pad.constants, False
+    pad = system.pad.constants
+    opens = False
 
     def mean(y: float) -> tuple[float, float, float]:
         nonlocal opens
@@ -136,7 +157,8 @@ def evaluation_seconds(system: System, *, summed: bool = False) -> float:
     `summed`: without a window.
     """
     if system.finds_patches:
-        terms, waves = len(system.shoe.g) + len(system.wheel.g), 1.0 + 2.0 * system.half_length * system.most_turns
+        terms = len(system.shoe.g) + len(system.wheel.g)
+        waves = 1.0 + 2.0 * system.half_length * system.most_turns
         return waves * terms * (_TERM_SECONDS + _PAIR_SECONDS * terms)
     waves = _WINDOW_WAVES if system.window_rows and not summed else len(system.wheel.g)
     return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * waves)

@@ -67,26 +67,35 @@ def ladder(system: System) -> Generator[System, Motion, Certified]:
     of rounding, and up to when the promise can be kept. The first steps may pass over samples, the last ones may
     not, nor over what speed or load do between two knots, as no run would see it.
     """
-    wanted, (first, every) = system.method.tolerance, first_rung(system)
+    wanted = system.method.tolerance
+    first, every = first_rung(system)
     longest = min(_shortest_span(system) / STEPS_BETWEEN_KNOTS, system.interval) * (1.0 + 1e-9)
-    nodes, steps, quadrature = first_nodes(system), _Axis(), _Nodes()
-    before, finer, seconds, rounding = None, steps, 0.0, Rounding(0.0, system.sampled_duration, wanted)
+    nodes = first_nodes(system)
+    steps = _Axis()
+    quadrature = _Nodes()
+    before = None
+    finer = steps
+    seconds = 0.0
+    rounding = Rounding(0.0, system.sampled_duration, wanted)
     steps_before = 0
     while True:
         rung = system.by(nodes=nodes << quadrature.doublings, step=first * 0.5**steps.doublings)
         rung = replace(rung, interval=max(1, every >> steps.doublings) * system.interval)
         beside = (yield replica(rung)) if before is None else None
         run = yield rung
-        spent, failed = run.work.solve_seconds, run.work.failed
+        spent = run.work.solve_seconds
+        failed = run.work.failed
         if beside:
             steps_before += beside.work.steps
-            seconds, failed = seconds + beside.work.solve_seconds, failed or beside.work.failed
+            seconds = seconds + beside.work.solve_seconds
+            failed = failed or beside.work.failed
             rounding = rounding if failed else Rounding.of(beside, run, wanted)
         run.work.solve_seconds = seconds = seconds + spent
         run.work.coarser_steps = steps_before
         steps_before = run.work.all_steps
         if before is not None and not failed:
-            finer.before, finer.last = finer.last, compare(before, run, rounding.until).error
+            finer.before = finer.last
+            finer.last = compare(before, run, rounding.until).error
         before = before if failed else run
         opens = set(run.work.evaluators) != {"closed-form"}
         used = quadrature if nodes and opens else _Axis(0, 0.0, 0.0)
@@ -130,7 +139,8 @@ def _jump_error(run: Motion) -> float:
 
 def first_rung(system: System) -> tuple[float, int]:
     """The steps (s) that a ladder begins with, and how many samples each passes over, a power of two."""
-    interval, fastest = system.interval, 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
+    interval = system.interval
+    fastest = 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
     wanted = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance)) / fastest
     wanted = min(wanted, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
     wanted = min(wanted, max(_shortest_span(system) / STEPS_BETWEEN_KNOTS, wanted / 2**MOST_DOUBLINGS))

@@ -38,7 +38,9 @@ _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run 
 FILE_BYTES = 1e5  # of a result without its samples
 _PROCESS_BYTES = 2e8  # of memory, without histories and tables
 _ABOVE_NYQUIST = 0.4  # of a period: the longest advised sample interval, with room below half of it
-_SHORTEST, _KNOWN = 1e-6, 1.001  # step over that of the case to which a stable one is sought, and its bracket
+# step over that of the case to which a stable one is sought, and its bracket
+_SHORTEST = 1e-6
+_KNOWN = 1.001
 _GROWN = 1e-3  # growth by the end of the run that is worth a warning
 _ROUNDING = 1e-8  # of the factors of a step
 
@@ -64,7 +66,8 @@ class Check:
 
 def check(system: System, *, begin: bool = False) -> Check:
     """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs."""
-    own, fastest = system.method.own_steps, system.natural_frequencies[1]
+    own = system.method.own_steps
+    fastest = system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
     price = guessed(system)
     if (begin or price.seconds > MOST_SECONDS) and system.steps <= MOST_STEPS:
@@ -91,7 +94,8 @@ def refuse(found: Check, free_bytes: float = math.inf, *, timed: bool = True) ->
 
     Unless `timed`, its text holds no number that was measured, and differs each time.
     """
-    system, growth = found.system, found.limits.growth
+    system = found.system
+    growth = found.limits.growth
     room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
     least = "at least " if found.at_least else ""
     size = f"about {found.steps:.3g} steps, {least}{duration_text(found.seconds)}, {room}"
@@ -143,7 +147,10 @@ def _down(number: float) -> str:
 
 def adjustments(system: System) -> list[str]:
     """Sentences on how a run differs from the numbers of the case: surfaces, start, grid of time, and nodes."""
-    method, interval, asked, found = system.method, system.interval, system.method.step, [*system.notes]
+    method = system.method
+    interval = system.interval
+    asked = system.method.step
+    found = [*system.notes]
     start = system.initial
     if start.from_equilibrium and (start.x or start.y):
         moved = f"x = {start.x:g} m and y = {start.y:g} m are added to the position of steady sliding"
@@ -169,11 +176,14 @@ def adjustments(system: System) -> list[str]:
 
 def _warnings(found: Check) -> Iterator[str]:
     """What a careful user would want to know: one sentence each, with its key and number."""
-    system, per_wave = found.system, found.nodes_per_wave
+    system = found.system
+    per_wave = found.nodes_per_wave
     if not system.method.own_steps:
         for what, longest, otherwise in _unresolved(system, found.steps_per_period):
             yield f"solver.step: {what}; take a step of at most {_down(longest)} s{otherwise}"
-    nyquist, contact, waves = 0.5 / system.interval, system.natural_frequencies[1], system.passing_frequency
+    nyquist = 0.5 / system.interval
+    contact = system.natural_frequencies[1]
+    waves = system.passing_frequency
     for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
         if frequency > nyquist:
             above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would be aliased"
@@ -183,7 +193,8 @@ def _warnings(found: Check) -> Iterator[str]:
         remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
         yield f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; {remedy}"
     yield from _of_the_scheme(system, found.limits, found.steps)
-    pad, around = 2.0 * system.half_length, 2.0 * math.pi * system.radius
+    pad = 2.0 * system.half_length
+    around = 2.0 * math.pi * system.radius
     if pad > around:
         longer = f"the pad of {pad:.3g} m is longer than the wheel's circumference of {around:.3g} m"
         yield f"contact.half_length: {longer}; check their units"
@@ -193,7 +204,9 @@ def _warnings(found: Check) -> Iterator[str]:
 
 def _unresolved(system: System, per_period: float) -> Iterator[tuple[str, float, str]]:
     """What the step is too long for, the longest step (s) that is not, and another remedy."""
-    c, step, fastest = system.coefficients, system.step, system.natural_frequencies[1]
+    c = system.coefficients
+    step = system.step
+    fastest = system.natural_frequencies[1]
     if per_period < RESOLVED:
         what = f"{per_period:.3g} steps per period of the fastest motion ({fastest:.4g} Hz): it is not resolved"
         yield what, 1.0 / (RESOLVED * fastest), ""
@@ -202,7 +215,8 @@ def _unresolved(system: System, per_period: float) -> Iterator[tuple[str, float,
         if rate * step > 2.0 * math.pi / RESOLVED:
             what = f"the dashpots damp a motion at a rate of {rate:.4g} 1/s, which the step does not resolve"
             yield what, 2.0 * math.pi / (RESOLVED * rate), ", or event-driven"
-    passing, speed = system.passing_frequency, system.fastest_belt
+    passing = system.passing_frequency
+    speed = system.fastest_belt
     if passing * step > 1.0 / RESOLVED:
         what = f"{1.0 / (passing * step):.3g} steps per passing wave of the wheel ({passing:.4g} Hz)"
         yield what, 1.0 / (RESOLVED * passing), ""

@@ -5,8 +5,10 @@ from brakecli.solver.motion import Motion
 
 def modelled(motion: Motion) -> tuple[list[str], list[str]]:
     """Sentences on what was modelled and on what was left out, by the system and by the steps that were taken."""
-    system, work = motion.system, motion.work
-    c, smooth = system.coefficients, system.smooth
+    system = motion.system
+    work = motion.work
+    c = system.coefficients
+    smooth = system.smooth
     closed = work.evaluators.get("closed-form", 0)
     opened = sum(work.evaluators.values()) - closed
     neither = not smooth and not opened

@@ -30,7 +30,9 @@ AIM = 0.4
 _FAR = 2.0
 """Error of steps over the promised one, beyond which a run ends early: a finer one has to follow anyway."""
 _MOST_RUNS = 8
-_LEAST, _MOST = 1e-3, 8.0  # factors by which tolerance and nodes change at once
+# factors by which tolerance and nodes change at once
+_LEAST = 1e-3
+_MOST = 8.0
 _BEYOND = 1e-3  # times the finest: a tolerance that no run has, as errors may fall faster than it
 _SURER = 0.03  # of its error, that the next run is to have where an event may have been missed
 _EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are shorter and of higher order
@@ -89,7 +91,10 @@ def promised(
     It yields what is to be run, receives its motion, and returns the last one with its certificate. `safety` is
     what is promised, over the error that a run knows.
     """
-    wanted, duration, seconds, steps_before = system.method.tolerance, system.sampled_duration, 0.0, 0
+    wanted = system.method.tolerance
+    duration = system.sampled_duration
+    seconds = 0.0
+    steps_before = 0
     most = _FAR * wanted / safety
     for left in range(_MOST_RUNS, 0, -1):
         most = most if left > 1 else math.inf
@@ -101,16 +106,19 @@ def promised(
         steps, by_nodes, both = known.of.max(axis=0).tolist()
         coarse = most < math.inf and motion.work.failure is Failure.COARSE
         reached = float(motion.work.failure_time or 0.0) if coarse else duration
-        error, failed = max(safety * both, ROUNDING), motion.work.failed and not coarse
+        error = max(safety * both, ROUNDING)
+        failed = motion.work.failed and not coarse
         until = known.until(wanted / safety, duration)
         certified = not (failed or coarse) and error <= wanted and until >= duration
         late = seconds > MOST_SECONDS
         if certified or failed or most == math.inf or (late and not coarse):
             break
         surer = _SURER if known.unsure < duration else math.inf
-        aim, rest = min(AIM * wanted / safety, surer * both), 1.0
+        aim = min(AIM * wanted / safety, surer * both)
+        rest = 1.0
         if coarse:  # errors of steps add up, those of nodes at random; half the aim, as that is a guess
-            aim, rest = 0.5 * aim, duration / reached
+            aim = 0.5 * aim
+            rest = duration / reached
         found = None if late else finer(rung, max(1.0, rest * steps / aim), max(1.0, rest**0.5 * by_nodes / aim))
         if found is None and not coarse:
             break
@@ -119,7 +127,8 @@ def promised(
     motion.work.solve_seconds = seconds
     if not certified:
         error = max(error, wanted * MISSED) if error < np.inf else 1.0
-    method, with_nodes = rung.method, f" and {rung.nodes} nodes" if rung.nodes else ""
+    method = rung.method
+    with_nodes = f" and {rung.nodes} nodes" if rung.nodes else ""
     steps_of = f"to {method.tolerance:.0e}" if method.own_steps else f"of {rung.step:.3g} s"
     how = f"the error that is carried along with steps {steps_of}{with_nodes}"
     assert motion.own is not None

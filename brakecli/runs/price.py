@@ -28,7 +28,8 @@ SHORTER = 16.0
 """By what the first part becomes shorter where it is given up; a choice."""
 LONGER = 32.0
 """By what a part is longer than the one before, at most; a choice: a short one may only have started."""
-MOST_EXACT, MOST_AT_NODES = 0.02, 2e-3
+MOST_EXACT = 0.02
+MOST_AT_NODES = 2e-3
 """Guessed time (s) of an evaluation of the contact, exact and by nodes, beyond which no step is tried. Choices:
 a part takes many."""
 FINER = 1.5
@@ -62,8 +63,11 @@ def measured(system: System) -> Price | None:
 
 def _begun(system: System) -> Price:
     """The cost of a case that starts soon."""
-    method, duration, guess = system.method, system.sampled_duration, guessed(system)
-    length, before = duration * min(1.0, FIRST / max(guess.seconds, FIRST)), _Part(0.0, 0.0)
+    method = system.method
+    duration = system.sampled_duration
+    guess = guessed(system)
+    length = duration * min(1.0, FIRST / max(guess.seconds, FIRST))
+    before = _Part(0.0, 0.0)
     _ran(system, length)  # kernels are loaded first
     while True:
         part = _ran(system, length)
@@ -77,7 +81,8 @@ def _begun(system: System) -> Price:
             continue
         if part.motion is None or part.seconds >= ENOUGH:
             break
-        before, length = part, min(length * min(AIM / max(part.seconds, 1e-9), LONGER), duration)
+        before = part
+        length = min(length * min(AIM / max(part.seconds, 1e-9), LONGER), duration)
     reached = length if unknown else part.length
     rate = max(part.seconds - before.seconds, 0.0) / (reached - before.length)
     rate *= FINER if method.step is None and not method.row.exact else 1.0
@@ -94,8 +99,10 @@ def _begun(system: System) -> Price:
 
 def _ran(system: System, length: float) -> _Part:
     """A part so long (s); of one that is given up, as far as its only run has come."""
-    part, begin = asked(replace(system, duration=length, interval=min(length, system.interval))), process_time()
-    reached, motion = 0.0, None
+    part = asked(replace(system, duration=length, interval=min(length, system.interval)))
+    begin = process_time()
+    reached = 0.0
+    motion = None
 
     def tell(done: int) -> None:
         nonlocal reached

@@ -93,7 +93,8 @@ def run(
         found = check(system)
         with new_result(output, force=force) as result:
             refuse(found, free_bytes(output.resolve().parent))
-            counted, sink = "steps" if found.step else "samples", _history_sink(result, system.interval)
+            counted = "steps" if found.step else "samples"
+            sink = _history_sink(result, system.interval)
 
             def shown_by(part: System) -> Progress:
                 total = part.samples if part.method.step is None else part.steps
@@ -107,7 +108,8 @@ def run(
                 loaded = with_duration(loaded, system.duration)
                 sink(motion.rows)
             else:
-                known, (motion, certificate) = None, motion_of(system, shown_by(system), sink)
+                known = None
+                motion, certificate = motion_of(system, shown_by(system), sink)
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))

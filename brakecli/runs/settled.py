@@ -63,10 +63,13 @@ def settled(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
     """
     if not system.settles:
         return Settled(run(system), system)
-    part, most, taken = system, longest(system), 0
+    part = system
+    most = longest(system)
+    taken = 0
     while True:
         found = run(part)
-        verdict, work = found.verdict, found.motion.work
+        verdict = found.verdict
+        work = found.motion.work
         taken += work.all_steps
         needed = taken + 2 * work.all_steps  # for a run twice as long
         kept = found.certificate is None or found.certificate.certified or part.method.row.exact

@@ -40,7 +40,8 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     The record of answers that the run has stored decides, with these thresholds. The numbers are those of the run.
     """
     with stored_run(path) as run:
-        failure, system = run.attributes.get("failure"), run.system
+        failure = run.attributes.get("failure")
+        system = run.system
         numbers = {each.name: plain(run.attributes.get(each.name)) for each in fields.VERDICT}
         evidence = {name: plain(value) for name, value in run.evidence.items()}
         changing = over_time(run.history, system) if not failure and not system.steady else None

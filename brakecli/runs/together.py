@@ -21,7 +21,8 @@ from brakecli.solver.system import System
 
 TOGETHER = 64
 """Cases that are certified side by side."""
-FIRST_TURN, AT = 0.12, 1e-3
+FIRST_TURN = 0.12
+AT = 1e-3
 """By which angle (rad) the fastest motion turns in a first step, for this tolerance."""
 SAFETY = 3.0
 """What is promised, over the error that a run in a lane knows; docs/accuracy.md compares that with true ones."""
@@ -32,17 +33,21 @@ _MOST = 16.0  # times as fine, beyond which a run of its own is cheaper
 
 def _runs(system: System) -> Generator[System, Motion, Certified]:
     """What is run in lanes for a promise."""
-    fastest, waves = 2.0 * math.pi * system.natural_frequencies[1], FIRST_PER_WAVE * system.passing_frequency
+    fastest = 2.0 * math.pi * system.natural_frequencies[1]
+    waves = FIRST_PER_WAVE * system.passing_frequency
     turn = FIRST_TURN * (system.method.tolerance / AT) ** (1.0 / ORDER)
-    nodes, start_error = 2 * first_nodes(system), displacement(system)
+    nodes = 2 * first_nodes(system)
+    start_error = displacement(system)
 
     def rung(per_sample: float, more: float) -> System:
-        step, more_nodes = system.interval / _few(per_sample), int(nodes * _few(more))
+        step = system.interval / _few(per_sample)
+        more_nodes = int(nodes * _few(more))
         run = system.by(scheme="three-layer", theta=NUMEROV, step=step, nodes=more_nodes)
         return replace(run, start_error=start_error)
 
     def finer(run: System, steps: float, by_nodes: float) -> System | None:
-        shorter, more = steps ** (1.0 / ORDER), by_nodes**0.5
+        shorter = steps ** (1.0 / ORDER)
+        more = by_nodes**0.5
         found = rung(shorter * run.per_sample, more * run.nodes / nodes)
         return None if max(shorter, more) > _MOST or exact_is_cheaper(found, system) else found
 
@@ -89,7 +94,9 @@ def certify_together(
         return run_together([ready[i] for i in at])
 
     while rungs:
-        places, ready, rungs = [*rungs], [*rungs.values()], {}
+        places = [*rungs]
+        ready = [*rungs.values()]
+        rungs = {}
         with np.errstate(all="ignore"):  # of a lane, which is left then
             motions = at_once([*map(fits, ready)], side_by_side)
         for i, motion in zip(places, motions, strict=True):

@@ -51,7 +51,8 @@ def begins_with_steps(system: System) -> bool:
 
 
 def _solved(system: System, progress: Progress) -> Motion:
-    per_sample, block = system.per_sample, 1
+    per_sample = system.per_sample
+    block = 1
     if system.nodes or not system.method.own_steps:
         block += int(FIRST_BLOCK / (evaluation_seconds(system) + 1e-6))
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
@@ -63,7 +64,9 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     Where that may be too much, a replica with other steps shows what the motion makes of it. Where samples are
     close, a step of this run passes over several of them.
     """
-    wanted, run, longest = system.method.tolerance, _solved(system, progress), SHORTER * system.longest_step
+    wanted = system.method.tolerance
+    run = _solved(system, progress)
+    longest = SHORTER * system.longest_step
     largest, carried = run.work.rounding or (np.zeros(4), np.zeros(4))
     error = max(ROUNDED_MARGIN * float((carried / sizes(system, largest, largest)).max()), ROUNDING)
     if error <= wanted and not run.work.failed:
@@ -76,7 +79,8 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     run.work.solve_seconds += other.work.solve_seconds
     run.work.coarser_steps = other.work.steps
     apart = compare(run, other)
-    error, failed = ROUNDING_MARGIN * apart.error, run.work.failed or other.work.failed
+    error = ROUNDING_MARGIN * apart.error
+    failed = run.work.failed or other.work.failed
     certified = error <= wanted and not failed
     until = system.sampled_duration if certified else apart.until(wanted / ROUNDING_MARGIN)
     steps = f"{run.system.step:.3g} and {other.system.step:.3g} s (displaced by {DISPLACED:.0e})"

@@ -49,7 +49,8 @@ def without_waves(system: System, state: Floats) -> Continued:
 def _level(flat: System, orbit: Orbit) -> float:
     """Standard deviation (m/s) of vx in a period of a limit cycle."""
     x, y, v_x, v_y = orbit.state
-    exact, interval = flat.by(scheme="piecewise-exact", step=orbit.period), orbit.period / SAMPLES
+    exact = flat.by(scheme="piecewise-exact", step=orbit.period)
+    interval = orbit.period / SAMPLES
     beginning = Initial(x, y, v_x, v_y)
     once = replace(exact, initial=beginning, interval=interval, duration=orbit.period, tracked=False)
     return float(solve(once).rows[1:, V_X].std())

@@ -48,7 +48,8 @@ def under_scatter(
 def _changed(columns: dict[str, list[float]], change: Change | None, base: LoadedCase) -> LoadedSweep:
     """The samples with a change; raises CaseError where one of them is no case."""
     if change is not None:
-        count, to = len(next(iter(columns.values()))), float(change.rounded)
+        count = len(next(iter(columns.values())))
+        to = float(change.rounded)
         own = columns.get(change.parameter, [change.start] * count)
         columns = columns | {change.parameter: [each + (to - change.start) for each in own]}
     return sweep_of({"case": GIVEN, "points": GIVEN}, base, Listed.of([*columns], columns.values()))

@@ -48,7 +48,8 @@ class Indices:
         if len(names) == 1:
             return cls(of, {names[0]: 1.0}, {names[0]: 1.0}, {names[0]: 0.0})
         first, total = _indices(answers)
-        rng, many = np.random.default_rng([seed, len(names)]), answers.shape[1]
+        rng = np.random.default_rng([seed, len(names)])
+        many = answers.shape[1]
         again = [_indices(answers[:, rng.integers(many, size=many)])[1] for _ in range(_RESAMPLED)]
         errors = stats.norm.ppf(0.5 + 0.5 * LEVEL) * np.std(again, axis=0)
         named = [dict(zip(names, each.tolist(), strict=True)) for each in (first, total, errors)]
@@ -56,7 +57,9 @@ class Indices:
 
 
 def _indices(answers: Floats) -> tuple[Floats, Floats]:
-    a, b, mixed = answers[0][None], answers[1][None], answers[2:, None]
+    a = answers[0][None]
+    b = answers[1][None]
+    mixed = answers[2:, None]
     found = stats.sobol_indices(func={"f_A": a, "f_B": b, "f_AB": mixed}, n=answers.shape[1])
     return np.ravel(found.first_order), np.ravel(found.total_order)
 

@@ -22,7 +22,8 @@ def drawn(study: Study) -> Floats:
     they are too many.
     """
     _refuse_many(study)
-    count, many = len(study.parameter), -(-study.samples // SCRAMBLINGS)
+    count = len(study.parameter)
+    many = -(-study.samples // SCRAMBLINGS)
     rngs = [np.random.default_rng([study.seed, number]) for number in range(SCRAMBLINGS)]
     if study.sampling == "random":
         parts = rngs[0].random((1, study.samples, count))
@@ -44,7 +45,8 @@ def for_indices(study: Study) -> Floats:
     power = min(study.samples, _MOST_FOR_INDICES).bit_length() - 1
     rng = np.random.default_rng([study.seed, SCRAMBLINGS])
     both = stats.qmc.Sobol(2 * count, seed=rng).random_base2(power)
-    a, b = both[:, :count], both[:, count:]
+    a = both[:, :count]
+    b = both[:, count:]
     mixed = np.repeat(a[None], count, axis=0)
     for number in range(count):
         mixed[number, :, number] = b[:, number]
@@ -58,7 +60,8 @@ def has_indices(study: Study) -> bool:
 
 def _refuse_many(study: Study) -> None:
     """Raise RefusedError where samples and their values would take too much memory."""
-    given, keys = f"samples: are too many{found(study.samples)}", sum(len(each.paths) for each in study.parameter)
+    given = f"samples: are too many{found(study.samples)}"
+    keys = sum(len(each.paths) for each in study.parameter)
     if study.samples > MOST_SAMPLES:
         raise RefusedError(f"{given}; {MOST_SAMPLES} are the most, take fewer")
     of_indices = min(study.samples, _MOST_FOR_INDICES) * (len(study.parameter) + 2) if has_indices(study) else 0

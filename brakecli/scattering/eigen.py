@@ -30,7 +30,8 @@ def asking(plan: Plan, band: tuple[float, ...] | None) -> Compute:
 
 def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
     """The answers of all samples, in their order."""
-    found, finished = np.zeros(count, ASKED), np.zeros(count, np.bool_)
+    found = np.zeros(count, ASKED)
+    finished = np.zeros(count, np.bool_)
     queue = TaskQueue(finished, None, workers=engine.workers)
     for task, records, seconds, failure in engine.run(queue.next_task):
         if task is None:
@@ -38,11 +39,13 @@ def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
         if records is None:
             if not queue.retry(task):
                 place = slice(task.first, task.first + task.size)
-                found[place], finished[place] = _failed(failure), True
+                found[place] = _failed(failure)
+                finished[place] = True
             continue
         queue.note_time(task, seconds)
         place = slice(task.first, task.first + task.size)
-        found[place], finished[place] = np.frombuffer(records, ASKED), True
+        found[place] = np.frombuffer(records, ASKED)
+        finished[place] = True
         tell("shoes", int(finished.sum()), count)
     if not finished.all():
         raise BrakecliError("samples are missing; run the same command again")
@@ -69,7 +72,8 @@ def _asked(system: System, band: tuple[float, ...] | None) -> tuple[float, float
 
     A shoe that locks itself does not slide steadily: it is unstable, by what full contact makes of it.
     """
-    c, belt = system.coefficients, system.belt_speed
+    c = system.coefficients
+    belt = system.belt_speed
     if belt == 0.0:
         raise CaseError([Problem(("wheel",), "the wheel stands, so that nothing slides", "give it a speed")])
     rest = sliding(system)

@@ -33,7 +33,8 @@ from brakecli.sweeps.plan import LoadedSweep, Plan, sweep_of
 from brakecli.sweeps.result import SweepReport, unit
 from brakecli.sweeps.workers.task import Compute, Engine
 
-_SMOOTH_SECONDS, _ROUGH_SECONDS = 4e-4, 0.1
+_SMOOTH_SECONDS = 4e-4
+_ROUGH_SECONDS = 0.1
 """What the eigenvalues of a sample take, about."""
 _CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
 
@@ -121,7 +122,8 @@ def _listed(words: list[str]) -> str:
 def draw(loaded: LoadedStudy) -> Drawing:
     """Draw the samples of a study; raises CaseError where its keys do not fit its case."""
     study = loaded.study
-    values, others = drawn(study), for_indices(study) if has_indices(study) else None
+    values = drawn(study)
+    others = for_indices(study) if has_indices(study) else None
     beside = others is not None and study.method == "run" and study.indices_of != "squeal"
     together = [values] if others is None or beside else [values, others]
     tables = {"critical": _CRITICAL} if study.method == "run" else {}
@@ -166,7 +168,8 @@ def scatter(
     sweep are, and the same call goes on with them. Raises CaseError, RefusedError, UsageError or CannotWriteError
     before anything is computed.
     """
-    drawing, study = draw(loaded), loaded.study
+    drawing = draw(loaded)
+    study = loaded.study
     plan = drawing.sweep.plan
 
     def by_eigenvalues(sweep: LoadedSweep) -> dict[str, NDArray[Any]]:
@@ -210,7 +213,8 @@ def engine_for(
     each = _SMOOTH_SECONDS if system_of(plan.case({})).smooth else _ROUGH_SECONDS
     few = compute is not None and plan.points * each < WORKER_SECONDS
     if few and jobs is None and scheduler is None and scheduler_file is None:
-        jobs, in_caller = 1, True
+        jobs = 1
+        in_caller = True
     return choose_engine(plan, jobs, scheduler, scheduler_file, in_caller=in_caller, compute=compute)
 
 
@@ -222,7 +226,8 @@ def _report(
     beside: dict[str, NDArray[Any]] | None,
 ) -> ScatterReport:
     """What the answers say; those of the indices stand behind the others, or `beside`."""
-    study, (sets, many, _) = loaded.study, drawing.values.shape
+    study = loaded.study
+    sets, many, _ = drawing.values.shape
     count = sets * many
     hits = {name: each.reshape(sets, many) for name, each in _outcomes(study, drawing, columns, count).items()}
     failed = hits["failed"].ravel()
@@ -270,7 +275,8 @@ def _outcomes(
         found = {each.value: (kept["regime"] == each.value.encode()) & ~failed for each in Regime}
     else:
         growth = kept["growth_rate"]
-        failed, found = np.isnan(growth), {"stable": growth <= 0.0, "unstable": growth > 0.0}
+        failed = np.isnan(growth)
+        found = {"stable": growth <= 0.0, "unstable": growth > 0.0}
     path = ("friction", "coefficient")
     own = np.array([drawing.sweep.plan.settings(n).get(path, np.nan) for n in range(count)])
     own = np.where(np.isnan(own), drawing.sweep.plan.case({}).friction.coefficient, own)
@@ -292,7 +298,8 @@ def squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]
 
 def _write(result: ResultFile, report: ScatterReport) -> None:
     """Everything that the file holds."""
-    loaded, study = report.loaded, report.loaded.study
+    loaded = report.loaded
+    study = report.loaded.study
     texts = {"study_toml": loaded.text, "resolved_study_toml": loaded.resolved}
     result.set_attributes({**origin("scatter", loaded.title, loaded.base), **texts})
     result.set_fields(fields.SCATTER, report.numbers())
@@ -300,7 +307,8 @@ def _write(result: ResultFile, report: ScatterReport) -> None:
     sets, many, _ = report.values.shape
     result.variable("/", fields.SET, ("sample",), np.repeat(np.arange(sets), many))
     for number, scattering in enumerate(study.parameter):
-        name, keys = scattering.paths[0].replace(".", "_"), [*scattering.paths]
+        name = scattering.paths[0].replace(".", "_")
+        keys = [*scattering.paths]
         data = report.values[..., number].ravel()
         result.variable("/", Field(name, unit(keys[0]), ", ".join(keys)), ("sample",), data, parameters=keys)
     for each in fields.SCATTERED:

@@ -61,7 +61,8 @@ class Parameter(Table):
             for text in self.paths if getattr(self, name) is not None else ():
                 yield from self._wrong_key(name, text)
         normal = self.distribution == "normal"
-        bounded, spread = self.distribution in ("uniform", "triangular"), self.mean is not None
+        bounded = self.distribution in ("uniform", "triangular")
+        spread = self.mean is not None
         for one, other in (("low", "high"), ("mean", "deviation")):
             alone = [name for name in (one, other) if name in given]
             if len(alone) == 1:
@@ -70,11 +71,14 @@ class Parameter(Table):
             yield Problem(
                 ("low",), MISSING, "give low and high, mean and deviation, or tolerance_percent", instead=_NUMBERS
             )
-        low, high, mode = self.low, self.high, self.mode
+        low = self.low
+        high = self.high
+        mode = self.mode
         sound = low is None or high is None or low < high
         has_mode = self.distribution == "triangular" and low is not None and high is not None
         beside = mode is not None and low is not None and high is not None and not low <= mode <= high
-        keep, others = "keep one of the two", " and ".join(given[:-1])
+        keep = "keep one of the two"
+        others = " and ".join(given[:-1])
         in_part = self.tolerance_percent is not None and len(given) > 1
         only = "is only for a triangular distribution with low and high"
         yield from self.broken(
@@ -126,7 +130,8 @@ class Parameter(Table):
         if self.tolerance_percent is None:
             return self
         own = dict.fromkeys(numbers(case).get(key_path(text)) for text in self.paths)
-        (value, *others), remedy = own, "give low and high"
+        value, *others = own
+        remedy = "give low and high"
         if others:
             what = f"{', '.join(self.paths)} differ in the case: {', '.join(map(str, own))}"
         elif not isinstance(value, float) or not value:
@@ -149,16 +154,20 @@ class Parameter(Table):
         """The distribution, the probabilities below both ends of what is kept of it, or, if so, above them."""
         low, high, mean, deviation = (getattr(self, name) for name in _NUMBERS[:4])
         uniform, normal = (self.distribution == name for name in ("uniform", "normal"))
-        bounded, whole = uniform or self.distribution == "triangular", None in (low, high, mean, deviation)
+        bounded = uniform or self.distribution == "triangular"
+        whole = None in (low, high, mean, deviation)
         if bounded:
             if low is None:
                 half = deviation * math.sqrt(3.0 if uniform else 6.0)
-                low, high = mean - half, mean + half
-            width, mode = high - low, 0.5 * (low + high) if self.mode is None else self.mode
+                low = mean - half
+                high = mean + half
+            width = high - low
+            mode = 0.5 * (low + high) if self.mode is None else self.mode
             law = stats.uniform(low, width) if uniform else stats.triang((mode - low) / width, low, width)
         elif mean is None:
             ends = (low, high) if normal else (math.log(low), math.log(high))
-            middle, spread = 0.5 * (ends[0] + ends[1]), (ends[1] - ends[0]) / (2.0 * _LIMIT)
+            middle = 0.5 * (ends[0] + ends[1])
+            spread = (ends[1] - ends[0]) / (2.0 * _LIMIT)
             law = stats.norm(middle, spread) if normal else stats.lognorm(spread, scale=math.exp(middle))
         elif normal:
             law = stats.norm(mean, deviation)
@@ -229,7 +238,8 @@ class Study(OverCase):
             yield from self._wrong_correlation()
 
     def _wrong_correlation(self) -> Iterator[Problem]:
-        rows, count = self.correlation or (), len(self.parameter)
+        rows = self.correlation or ()
+        count = len(self.parameter)
         what = ""
         if [*map(len, rows)] != [count] * count:
             what = f"is no matrix with {count} rows of {count} numbers"
@@ -268,7 +278,8 @@ class LoadedStudy:
     @cached_property
     def study(self) -> Study:
         """The study with its limits; raises CaseError."""
-        laws, wrong = list[Parameter](), list[Problem]()
+        laws = list[Parameter]()
+        wrong = list[Problem]()
         for number, each in enumerate(self.given.parameter):
             try:
                 laws.append(each.over(self.base.case))

@@ -10,7 +10,8 @@ def at_once(keys: Sequence[Hashable], compute: Callable[[list[int]], Iterable[An
 
     `compute` gets the places of those that are alike, and gives what it finds of each in this order.
     """
-    found, alike = list[Any]([None] * len(keys)), defaultdict[Hashable, list[int]](list)
+    found = list[Any]([None] * len(keys))
+    alike = defaultdict[Hashable, list[int]](list)
     for place, key in enumerate(keys):
         if key is not None:
             alike[key].append(place)

@@ -14,7 +14,10 @@ from brakecli.solver.double_double import two_sum
 
 BACKWARD, STICK, FORWARD, OPEN = range(4)
 """The phases: the sign of the sliding velocity plus one, and flight."""
-HEIGHT, SLIDING, PULL, PUSH = 0, 1, 1, 2
+HEIGHT = 0
+SLIDING = 1
+PULL = 1
+PUSH = 2
 """The margins. Of each phase: how far the pad is from being clear, or is clear (m). Of slip: the sliding speed
 (m/s). Of stick: how far the force that it takes is within the friction cone (N), on the side where friction would
 have to pull harder, so that backward slip follows, and on the side where it would have to push."""
@@ -26,7 +29,8 @@ CONE = 1.0 + 1e-12
 SOONER = 0.125
 """Part of a time in which a margin that begins at zero is sought above it, and of that part, and so on."""
 
-_MOST_EVENTS, _NO_PROGRESS = 1000, 1e-6
+_MOST_EVENTS = 1000
+_NO_PROGRESS = 1e-6
 
 
 @kernel(float64(int64))

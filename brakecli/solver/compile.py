@@ -107,7 +107,9 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
         options["no_cpython_wrapper"] = private
         compiled: Any = not_compiled(function, options)
         if not config.DISABLE_JIT:
-            compiled.__class__, compiled.signature, compiled.private = _Waiting, signature, private
+            compiled.__class__ = _Waiting
+            compiled.signature = signature
+            compiled.private = private
             if not private and not is_cached(compiled, signature):  # before anything is timed
                 ready(compiled)
         return compiled  # type: ignore[no-any-return]

@@ -24,6 +24,7 @@ def set_trouble(text: str) -> None:
 def begins() -> None:
     """Call the notice once: a kernel is being compiled, as no cache holds it."""
     global _notice
-    notice, _notice = _notice, None
+    notice = _notice
+    _notice = None
     if notice is not None:
         notice(_trouble)

@@ -35,13 +35,17 @@ MOST_SAMPLES = 1 << 14
 """Most samples of a run in a lane, so that the histories of all lanes take little memory."""
 
 _CONTRACTION = 0.1  # of the iteration, at most
-_MOST_BYTES, _MOST_STEPS = 1e8, 1e9  # of the tables at the nodes, and between two samples
+# of the tables at the nodes, and between two samples
+_MOST_BYTES = 1e8
+_MOST_STEPS = 1e9
 _MOST_PASSED = 1e6  # waves, beyond which their phase needs more than 16 digits
 
 
 def fits(system: System) -> Hashable | None:
     """What runs have in common that may be computed together; None where a run may not."""
-    method, wheel, sliding = system.method, system.wheel, system.initial.vx - system.belt_speed
+    method = system.method
+    wheel = system.wheel
+    sliding = system.initial.vx - system.belt_speed
     kind = method.scheme, method.theta, method.start, method.iteration, system.evaluator
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
         return None
@@ -58,14 +62,19 @@ def fits(system: System) -> Hashable | None:
 @lru_cache(maxsize=4)
 def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[Any, ...]:
     """What `Shared` holds from `length` to `table`, for an even number of nodes."""
-    (pad, tables), half = build_pad(1.0, half_length, shoe, wheel, nodes), nodes // 2
-    waves, table = np.zeros((WAVES, 3)), aligned(half * (2 + 2 * WAVES)).reshape(half, -1)
-    own, tiles = len(wheel.g), -(-(nodes + 2 * BESIDE) // TILE)
-    full_at, waves_at = int(pad.full_at), int(pad.waves_at)
+    pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
+    half = nodes // 2
+    waves = np.zeros((WAVES, 3))
+    table = aligned(half * (2 + 2 * WAVES)).reshape(half, -1)
+    own = len(wheel.g)
+    tiles = -(-(nodes + 2 * BESIDE) // TILE)
+    full_at = int(pad.full_at)
+    waves_at = int(pad.waves_at)
     waves[:own] = np.stack([wheel.omega, wheel.phase, tables[full_at : full_at + own]], axis=1)
     by_tiles = tables[waves_at : waves_at + tiles * own * 2 * TILE].reshape(tiles, own, 2, TILE)
     f1 = tables[pad.nodes_at : pad.nodes_at + nodes]
-    table[:, 0], table[:, 1] = f1[:half], f1[: -half - 1 : -1]
+    table[:, 0] = f1[:half]
+    table[:, 1] = f1[: -half - 1 : -1]
     for wave, function in np.ndindex(own, 2):
         table[:, 2 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + half]
     heights = (float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean"))
@@ -84,16 +93,20 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
 
 def _run_lanes(systems: list[System]) -> list[Motion | None]:
     ready(advance)
-    begin, alike, number = time.perf_counter(), systems[0], len(systems)
+    begin = time.perf_counter()
+    alike = systems[0]
+    number = len(systems)
     o = filled([*systems, *systems[-1:] * (LANES - number)])
     rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))
     carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
     sizes = np.ones((PARTS if carried else 0, LANES))
     advance(o, shared(alike, DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried), rows, sizes)
     exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
-    seconds, motions = (time.perf_counter() - begin) / number, list[Motion | None]()
+    seconds = (time.perf_counter() - begin) / number
+    motions = list[Motion | None]()
     for n, (system, exponent) in enumerate(zip(systems, exponents, strict=False)):
-        steps, closed = system.steps, int(o.closed[n])
+        steps = system.steps
+        closed = int(o.closed[n])
         kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
         work = Work(steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds)
         work.solve_seconds = seconds
@@ -113,17 +126,21 @@ def shared(system: System, first: int, beyond: int) -> Shared:
     """What a system has in common with others beside it, where the kinds from `first` on are carried along."""
     grid = system.step, system.interval, system.per_sample, system.nodes
     surfaces = _tables(system.half_length, system.shoe, system.wheel, system.nodes)
-    gaps, signals = aligned(PAIR * (system.nodes // 2 + 3)), np.frombuffer(stop.memory, np.uint8).ctypes.data
+    gaps = aligned(PAIR * (system.nodes // 2 + 3))
+    signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
     return Shared._make((*grid, *surfaces, gaps, signals, first, beyond))
 
 
 def filled(systems: Sequence[System]) -> Any:
     """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
     c = Coefficients(*np.array([each.coefficients for each in systems]).T)
-    start, h, wheel = np.array([_start(each) for each in systems]).T, systems[0].step, systems[0].wheel
+    start = np.array([_start(each) for each in systems]).T
+    h = systems[0].step
+    wheel = systems[0].wheel
     load, belt, k = np.array([(each.load_at_start, each.belt_speed, each.layer_stiffness) for each in systems]).T
     side = np.sign(start[2] - belt)
-    grip, now = -side * c.phi, 1.0 - THETA_1
+    grip = -side * c.phi
+    now = 1.0 - THETA_1
     a_11 = 2.0 * c.m / h + now * c.b_xx + 2.0 * THETA_1 * h * c.c_xx  # Eq. (14)
     a_12 = now * c.b_xy + 2.0 * THETA_1 * h * c.c_xy
     a_22 = 2.0 * c.m / h + now * c.b_yy + 2.0 * THETA_1 * h * c.c_yy

@@ -35,8 +35,16 @@ def _add_wave(f2: Floats, table: Floats, s: float, c: float) -> None:
 @kernel(void(vector, vector, vector, vector), fastmath=FAST)
 def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
     """Add five waves at once: f2 is read and written only once."""
-    s_0, s_1, s_2, s_3, s_4 = s[0], s[1], s[2], s[3], s[4]
-    c_0, c_1, c_2, c_3, c_4 = c[0], c[1], c[2], c[3], c[4]
+    s_0 = s[0]
+    s_1 = s[1]
+    s_2 = s[2]
+    s_3 = s[3]
+    s_4 = s[4]
+    c_0 = c[0]
+    c_1 = c[1]
+    c_2 = c[2]
+    c_3 = c[3]
+    c_4 = c[4]
     for j in range(TILE):
         one = c_0 * table[j] + s_0 * table[j + TILE] + c_1 * table[j + 2 * TILE] + s_1 * table[j + 3 * TILE]
         two = (
@@ -51,9 +59,13 @@ def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
 @kernel(types.UniTuple(vector, 2)(float64, LAYER))
 def phases(x: float, layer: Layer) -> tuple[Floats, Floats]:
     """Sine and cosine of the phase ωx + ψ of each wave; they come eight at a time."""
-    pad, waves = layer.pad, layer.pad.wheel_terms
-    at, omega_at, eights = pad.nodes + 2 * BESIDE + 2 * TILE, pad.wheel_at + waves, (waves + 7) // 8 * 8
-    sines, cosines = layer.scratch[at : at + eights], layer.scratch[at + eights : at + 2 * eights]
+    pad = layer.pad
+    waves = layer.pad.wheel_terms
+    at = pad.nodes + 2 * BESIDE + 2 * TILE
+    omega_at = pad.wheel_at + waves
+    eights = (waves + 7) // 8 * 8
+    sines = layer.scratch[at : at + eights]
+    cosines = layer.scratch[at + eights : at + 2 * eights]
     for i in range(waves):
         sines[i] = layer.tables[omega_at + i] * x + layer.angles[i]
     for i in range(eights):
@@ -64,27 +76,35 @@ def phases(x: float, layer: Layer) -> tuple[Floats, Floats]:
 @kernel(void(float64, vector, LAYER))
 def _sum_waves(x: float, f2: Floats, layer: Layer) -> None:
     """f2 = Σ g sin(ω(ξ + x) + ψ) where the shoe is at x, in whole tiles."""
-    pad, tables, (sines, cosines) = layer.pad, layer.tables, phases(x, layer)
-    waves, at = pad.wheel_terms, pad.waves_at
+    pad = layer.pad
+    tables = layer.tables
+    sines, cosines = phases(x, layer)
+    waves = pad.wheel_terms
+    at = pad.waves_at
     for begin in range(0, f2.size, TILE):
         if stopped(pad.signals):
             return
-        tile, i = f2[begin : begin + TILE], 0
+        tile = f2[begin : begin + TILE]
+        i = 0
         for j in range(TILE):
             tile[j] = 0.0
         while i + 5 <= waves:
             _add_five(tile, tables[at : at + 10 * TILE], sines[i : i + 5], cosines[i : i + 5])
-            i, at = i + 5, at + 10 * TILE
+            i = i + 5
+            at = at + 10 * TILE
         while i < waves:
             _add_wave(tile, tables[at : at + 2 * TILE], sines[i], cosines[i])
-            i, at = i + 1, at + 2 * TILE
+            i = i + 1
+            at = at + 2 * TILE
 
 
 @kernel(void(int64, LAYER), inlined=False)
 def _fill(tile: int, layer: Layer) -> None:
     """The heights in a tile of the window."""
     layer = borrowed(layer)
-    pad, window, n = layer.pad, layer.window, layer.pad.wheel_terms
+    pad = layer.pad
+    window = layer.window
+    n = layer.pad.wheel_terms
     travel, travel_low = two_product(-float(TILE * tile), window.rows * window.spacing)
     wheel_angles(layer.tables[pad.turns_at : pad.turns_at + 3 * n], travel, travel_low, layer.angles)
     for row in range(window.rows):
@@ -134,12 +154,30 @@ def _weigh(part: float, weights: Floats) -> None:
 def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer) -> None:
     """f2 as the weighted sum of `POINTS` heights, the first at a point of the grid."""
     size = f2.size
-    r_0, r_1, r_2 = _row(begin, size, layer), _row(begin + 1, size, layer), _row(begin + 2, size, layer)
-    r_3, r_4, r_5 = _row(begin + 3, size, layer), _row(begin + 4, size, layer), _row(begin + 5, size, layer)
-    r_6, r_7, r_8 = _row(begin + 6, size, layer), _row(begin + 7, size, layer), _row(begin + 8, size, layer)
-    r_9, r_10, r_11 = _row(begin + 9, size, layer), _row(begin + 10, size, layer), _row(begin + 11, size, layer)
-    w_0, w_1, w_2, w_3, w_4, w_5 = w[0], w[1], w[2], w[3], w[4], w[5]
-    w_6, w_7, w_8, w_9, w_10, w_11 = w[6], w[7], w[8], w[9], w[10], w[11]
+    r_0 = _row(begin, size, layer)
+    r_1 = _row(begin + 1, size, layer)
+    r_2 = _row(begin + 2, size, layer)
+    r_3 = _row(begin + 3, size, layer)
+    r_4 = _row(begin + 4, size, layer)
+    r_5 = _row(begin + 5, size, layer)
+    r_6 = _row(begin + 6, size, layer)
+    r_7 = _row(begin + 7, size, layer)
+    r_8 = _row(begin + 8, size, layer)
+    r_9 = _row(begin + 9, size, layer)
+    r_10 = _row(begin + 10, size, layer)
+    r_11 = _row(begin + 11, size, layer)
+    w_0 = w[0]
+    w_1 = w[1]
+    w_2 = w[2]
+    w_3 = w[3]
+    w_4 = w[4]
+    w_5 = w[5]
+    w_6 = w[6]
+    w_7 = w[7]
+    w_8 = w[8]
+    w_9 = w[9]
+    w_10 = w[10]
+    w_11 = w[11]
     for j in range(size):
         one = w_0 * r_0[j] + w_1 * r_1[j] + w_2 * r_2[j]
         two = w_3 * r_3[j] + w_4 * r_4[j] + w_5 * r_5[j]
@@ -151,7 +189,8 @@ def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer) -> None:
 @kernel(void(float64, vector, LAYER))
 def _interpolate(x: float, f2: Floats, layer: Layer) -> None:
     """f2 where the shoe is at x, from the window."""
-    window, shift = layer.window, layer.window.shift
+    window = layer.window
+    shift = layer.window.shift
     place = (x - window.travel) / window.spacing
     whole = np.floor(place)
     point = whole - window.points

@@ -30,7 +30,9 @@ def array_history(interval: float, rows: NDArray[np.float64]) -> History:
 
 def stacked(histories: Sequence[History]) -> History:
     """Many histories at once, which have the same interval and as many samples."""
-    interval, samples, read = histories[0].interval, histories[0].samples, histories[0].read
+    interval = histories[0].interval
+    samples = histories[0].samples
+    read = histories[0].read
     if len(histories) == 1:  # which may be too long for memory
         return History(interval, samples, lambda *given: read(*given)[None])
 

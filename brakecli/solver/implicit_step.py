@@ -14,7 +14,8 @@ from brakecli.solver.compile import at_address, borrowed, kernel
 from brakecli.solver.friction import minimise, slopes
 from brakecli.solver.records import EVALUATE, LAYER, PROBLEM_TYPE, SOLVE, Layer
 
-SOLVED, UNCONVERGED = 0, 1
+SOLVED = 0
+UNCONVERGED = 1
 _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""
@@ -35,9 +36,15 @@ def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
     The residual is r(f) = F_y(x_0 + gain d, y_0 + gain e) - f.
     """
     layer = borrowed(layer)
-    a_11, a_12, a_22, phi = problem.a_11, problem.a_12, problem.a_22, problem.phi
+    a_11 = problem.a_11
+    a_12 = problem.a_12
+    a_22 = problem.a_22
+    phi = problem.phi
     d, e, side = minimise(a_11, a_12, a_22, problem.g_1, problem.g_2 + f, phi * f, problem.belt)
-    problem.d, problem.e, problem.side, problem.normal_force = d, e, side, f
+    problem.d = d
+    problem.e = e
+    problem.side = side
+    problem.normal_force = f
     problem.d_slope, problem.e_slope = slopes(a_11, a_12, a_22, phi, side)
     y = problem.y_0 + problem.gain * e
     _evaluate_at(layer.evaluate)(problem.x_0 + problem.gain * d, y, layer)
@@ -53,11 +60,19 @@ def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> b
     Up to f the contact is linear, F_y + ∂F_y/∂x Δx + ∂F_y/∂y Δy, but for places that begin or cease to touch, for
     the curvature of f2 and for the error of its slope. `contact` becomes that of f.
     """
-    pad, contact, gain = layer.pad, layer.contact, problem.gain
-    a_11, a_12, a_22, phi = problem.a_11, problem.a_12, problem.a_22, problem.phi
+    pad = layer.pad
+    contact = layer.contact
+    gain = problem.gain
+    a_11 = problem.a_11
+    a_12 = problem.a_12
+    a_22 = problem.a_22
+    phi = problem.phi
     d, e, side = minimise(a_11, a_12, a_22, problem.g_1, problem.g_2 + f, phi * f, problem.belt)
-    x, y = gain * (d - problem.d), gain * (e - problem.e)
-    along, near, reach = abs(x), contact.near, contact.reach
+    x = gain * (d - problem.d)
+    y = gain * (e - problem.e)
+    along = abs(x)
+    near = contact.near
+    reach = contact.reach
     move = abs(y) + pad.steep * along
     contact.reach = max(_REACH * move, 0.5 * reach)  # of the next evaluation
     if side != problem.side or move > reach:
@@ -66,7 +81,10 @@ def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> b
     lost = near * move + (contact.blur + 0.5 * pad.curved * contact.stiffness * along) * along
     if not abs(normal_force - f) + lost <= allowed:
         return False
-    problem.d, problem.e, problem.normal_force, problem.residual = d, e, f, normal_force - f
+    problem.d = d
+    problem.e = e
+    problem.normal_force = f
+    problem.residual = normal_force - f
     contact.normal_force = normal_force
     contact.store_x -= contact.tangential * y
     return True
@@ -83,7 +101,8 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     """
     layer = borrowed(layer)
     contact = layer.contact
-    low, high = 0.0, math.inf
+    low = 0.0
+    high = math.inf
     f = problem.normal_force
     rising = 0
     before_last = last = math.inf  # lengths of steps
@@ -91,9 +110,16 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
         r, rounding = _try_force(layer, problem, f)
         gain = problem.gain
         if gain == 0.0:  # explicit: the contact does not depend on this step's unknowns
-            f, a_11, a_12, a_22 = contact.normal_force, problem.a_11, problem.a_12, problem.a_22
+            f = contact.normal_force
+            a_11 = problem.a_11
+            a_12 = problem.a_12
+            a_22 = problem.a_22
             d, e, side = minimise(a_11, a_12, a_22, problem.g_1, problem.g_2 + f, problem.phi * f, problem.belt)
-            problem.d, problem.e, problem.side, problem.normal_force, problem.residual = d, e, side, f, 0.0
+            problem.d = d
+            problem.e = e
+            problem.side = side
+            problem.normal_force = f
+            problem.residual = 0.0
             return SOLVED, evaluation, 0
         slope = gain * (contact.tangential * problem.d_slope - contact.stiffness * problem.e_slope) - 1.0
         if slope >= 0.0:
@@ -114,7 +140,8 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
         allowed = abs(slope) * _RELATIVE * max(new, contact.normal_force) + rounding
         if _take_unevaluated(layer, problem, new, allowed):
             return SOLVED, evaluation, rising
-        before_last, last = last, abs(new - f)
+        before_last = last
+        last = abs(new - f)
         f = new
     return UNCONVERGED, most, rising
 
@@ -122,7 +149,8 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
 @kernel(SOLVE)
 def fixed_point(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     """The paper's iteration, (13) and (24), from d(0) = dⁿ, e(0) = eⁿ; (outcome, evaluations, 0)."""
-    contact, gain = layer.contact, problem.gain
+    contact = layer.contact
+    gain = problem.gain
     _evaluate_at(layer.evaluate)(problem.x_0 + gain * problem.d, problem.y_0 + gain * problem.e, layer)
     f = contact.normal_force
     for evaluation in range(2, most + 1):

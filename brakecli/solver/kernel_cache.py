@@ -109,7 +109,8 @@ def not_compiled(function: Any, options: dict[str, Any]) -> Any:
     """A kernel that is not compiled yet, with its place in the cache, if that can be used."""
     if CACHE is not None:
         before = config.CACHE_DIR, caching.IndexDataCacheFile
-        config.CACHE_DIR, caching.IndexDataCacheFile = str(CACHE), _CheckedFiles
+        config.CACHE_DIR = str(CACHE)
+        caching.IndexDataCacheFile = _CheckedFiles
         try:
             return njit(cache=True, **options)(function)
         except Exception:  # the cache cannot be used after all: do without
@@ -143,7 +144,8 @@ def is_cached(dispatcher: Any, signature: Any) -> bool:
 
 def compile_for(dispatcher: Any, signature: Any) -> None:
     """Compile a kernel for one signature, or load it from the cache."""
-    before, maker = len(_held), dispatcher.targetctx.codegen()
+    before = len(_held)
+    maker = dispatcher.targetctx.codegen()
     maker._library_class, libraries = _Whole, maker._library_class
     try:
         dispatcher.compile(signature)

@@ -13,7 +13,8 @@ def coefficients(
     *, mass: float, c_1: float, b_1: float, beta_deg: float, c_2: float, b_2: float, alpha_deg: float, phi: float
 ) -> Coefficients:
     """Coefficients for link 1 at `beta_deg` to the vertical and link 2 at `alpha_deg` to the friction plane."""
-    beta, alpha = sin_cos(beta_deg), sin_cos(alpha_deg)
+    beta = sin_cos(beta_deg)
+    alpha = sin_cos(alpha_deg)
     return Coefficients(mass, *tensor(b_1, b_2, beta, alpha), *tensor(c_1, c_2, beta, alpha), *beta, phi)
 
 
@@ -22,7 +23,8 @@ def tensor(one: Any, two: Any, beta: Pair, alpha: Pair) -> tuple[Any, Any, Any]:
 
     It takes all that can be added and multiplied.
     """
-    (sin_beta, cos_beta), (sin_alpha, cos_alpha) = beta, alpha
+    sin_beta, cos_beta = beta
+    sin_alpha, cos_alpha = alpha
     return (
         one * sin_beta**2 + two * cos_alpha**2,
         one * sin_beta * cos_beta - two * sin_alpha * cos_alpha,
@@ -33,7 +35,9 @@ def tensor(one: Any, two: Any, beta: Pair, alpha: Pair) -> tuple[Any, Any, Any]:
 @lru_cache(maxsize=256)  # the points of a block are asked for again and again
 def natural_frequencies(c: Coefficients, contact_stiffness: float) -> tuple[float, float]:
     """Undamped natural frequencies (Hz, rising) of the shoe on its links and a contact stiffness (N/m)."""
-    s_xx, s_xy, s_yy = c.c_xx, c.c_xy, c.c_yy + contact_stiffness
+    s_xx = c.c_xx
+    s_xy = c.c_xy
+    s_yy = c.c_yy + contact_stiffness
     high = 0.5 * (s_xx + s_yy) + math.hypot(0.5 * (s_xx - s_yy), s_xy)
     low = (s_xx * s_yy - s_xy**2) / high if high > 0.0 else 0.0
     return math.sqrt(max(low, 0.0) / c.m) / (2.0 * math.pi), math.sqrt(max(high, 0.0) / c.m) / (2.0 * math.pi)

@@ -22,7 +22,8 @@ _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple
 _evaluate_at, _prepare_at, _finish_at, _solve_at = (
     at_address(signature) for signature in (EVALUATE, PREPARE, FINISH, SOLVE)
 )
-hold, _plant_at = into_memory(PLANT), from_memory(PLANT)
+hold = into_memory(PLANT)
+_plant_at = from_memory(PLANT)
 
 
 @kernel(void(PLANT, int64, float64), inlined=False)
@@ -33,14 +34,25 @@ def _mark(p: Plant, number: int, t: float) -> None:
     evaluation would change what the next one begins with.
     """
     p = borrowed(p)
-    state, track, contact, lag = p.state, p.track, p.layer.contact, p.grid.lag
-    after, slid, dy = 0.5 * lag * p.s.h, 0.0, 0.0
+    state = p.state
+    track = p.track
+    contact = p.layer.contact
+    lag = p.grid.lag
+    after = 0.5 * lag * p.s.h
+    slid = 0.0
+    dy = 0.0
     if lag == 1:
-        slid, dy = 0.5 * (state.x - state.x_old) - after * value_at(p.drive.belt, t), 0.5 * (state.y - state.y_old)
+        slid = 0.5 * (state.x - state.x_old) - after * value_at(p.drive.belt, t)
+        dy = 0.5 * (state.y - state.y_old)
     store = contact.store + contact.store_x * slid - contact.normal_force * dy
     store += (0.5 * contact.stiffness * dy - contact.tangential * slid) * dy
     at = mark(track, p.work, number, p.grid.samples, t + after, store)
-    at[0], at[1], at[2], at[3], at[4], at[5] = state.x, state.y, state.v_x, state.v_y, state.x_old, state.y_old
+    at[0] = state.x
+    at[1] = state.y
+    at[2] = state.v_x
+    at[3] = state.v_y
+    at[4] = state.x_old
+    at[5] = state.y_old
 
 
 @kernel(void(PLANT, vector))
@@ -52,11 +64,17 @@ def sample(p: Plant, row: Floats) -> None:
     changes it in a step: it sticks there, too, while the force needed lies inside the friction cone.
     """
     p = borrowed(p)
-    c, grid, drive, state, contact = p.c, p.grid, p.drive, p.state, p.layer.contact
+    c = p.c
+    grid = p.grid
+    drive = p.drive
+    state = p.state
+    contact = p.layer.contact
     number = (p.counts.level - grid.lag) // grid.per_sample
     t = grid.interval * number
     x, y = (state.x, state.y) if grid.lag == 0 else (state.x_old, state.y_old)
-    v_x, v_y, belt = state.v_x, state.v_y, value_at(drive.belt, t)
+    v_x = state.v_x
+    v_y = state.v_y
+    belt = value_at(drive.belt, t)
     if p.layer.pad.wheel_terms > 0:
         travel, travel_low = integral_at(drive.belt, t, 0.0)
         turn(travel, travel_low, p.layer)
@@ -64,7 +82,8 @@ def sample(p: Plant, row: Floats) -> None:
     p.counts.evaluations += 1
     normal = contact.normal_force
     bound = c.phi * normal
-    belt_slope, load = slope_at(drive.belt, t), value_at(drive.load, t)
+    belt_slope = slope_at(drive.belt, t)
+    load = value_at(drive.load, t)
     sliding = v_x - belt
     if abs(sliding) <= _ROUNDING * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
         sliding = 0.0
@@ -73,8 +92,14 @@ def sample(p: Plant, row: Floats) -> None:
     flicker = grid.lag * p.s.h * bound / c.m if p.counts.stuck >= p.counts.level - 1 else 0.0
     holds = abs(sliding) <= flicker and abs(needed) <= bound
     side, friction = observed(sliding, holds, needed, normal, bound)
-    row[0], row[1], row[2], row[3] = x, y, v_x, v_y
-    row[4], row[5], row[6], row[7] = friction, normal, contact.fraction, side
+    row[0] = x
+    row[1] = y
+    row[2] = v_x
+    row[3] = v_y
+    row[4] = friction
+    row[5] = normal
+    row[6] = contact.fraction
+    row[7] = side
     if p.track.on == 1 and number >= p.track.next:
         _mark(p, number, t)
 
@@ -85,10 +110,17 @@ def _needed(p: Plant) -> float:
 
     By (6) it is m U̇ + b_xx U + b_xy ẏ + c_xx x + c_xy y + Q_x.
     """
-    c, state, problem = p.c, p.state, p.problem
-    x, y, v_y, belt = state.x_old, state.y_old, state.v_y, problem.belt_now
+    c = p.c
+    state = p.state
+    problem = p.problem
+    x = state.x_old
+    y = state.y_old
+    v_y = state.v_y
+    belt = problem.belt_now
     if p.grid.lag == 0:  # in the middle of the step, as the normal force is
-        x, y, belt = 0.5 * (x + state.x), 0.5 * (y + state.y), 0.5 * (belt + problem.belt_next)
+        x = 0.5 * (x + state.x)
+        y = 0.5 * (y + state.y)
+        belt = 0.5 * (belt + problem.belt_next)
     needed = c.m * (problem.belt_next - problem.belt_now) / p.s.h + c.b_xx * belt + c.b_xy * v_y
     return needed + (c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta)  # type: ignore[no-any-return]
 
@@ -99,9 +131,15 @@ def _margin_rate(p: Plant, t: float, needed: float) -> float:
 
     The rate of `needed` follows from (6), with ÿ by (7).
     """
-    c, state, problem, h = p.c, p.state, p.problem, p.s.h
-    v_y, belt, force = state.v_y, problem.belt, problem.normal_force
-    belt_slope, load_slope = (problem.belt_next - problem.belt_now) / h, slope_at(p.drive.load, t)
+    c = p.c
+    state = p.state
+    problem = p.problem
+    h = p.s.h
+    v_y = state.v_y
+    belt = problem.belt
+    force = problem.normal_force
+    belt_slope = (problem.belt_next - problem.belt_now) / h
+    load_slope = slope_at(p.drive.load, t)
     against_y = c.b_xy * belt + c.b_yy * v_y + c.c_xy * state.x + c.c_yy * state.y + problem.load * c.cos_beta
     change = c.c_xx * belt + c.c_xy * v_y + c.b_xx * belt_slope + c.b_xy * (force - against_y) / c.m
     change += load_slope * c.sin_beta
@@ -116,19 +154,24 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
     A stick begins where m |vx - U| = t (bound ± needed), and ends where bound - |needed| = 0 by its rate.
     """
     p = borrowed(p)
-    c, track, state, problem, contact, h, lag = (
-        p.c,
-        p.track,
-        p.state,
-        p.problem,
-        p.layer.contact,
-        p.s.h,
-        p.grid.lag,
-    )
+    c = p.c
+    track = p.track
+    state = p.state
+    problem = p.problem
+    contact = p.layer.contact
+    h = p.s.h
+    lag = p.grid.lag
     was: int = track.phase
-    v_x, force, needed = state.v_x, problem.normal_force, _needed(p)
-    bound, sliding, at = c.phi * force, v_x - problem.belt, t + p.grid.weighted * h  # time of the forces
-    reached, x = t + (1 - lag) * h, state.x if lag == 0 else state.x_old  # where the velocity is
+    v_x = state.v_x
+    force = problem.normal_force
+    needed = _needed(p)
+    # time of the forces
+    bound = c.phi * force
+    sliding = v_x - problem.belt
+    at = t + p.grid.weighted * h
+    # where the velocity is
+    reached = t + (1 - lag) * h
+    x = state.x if lag == 0 else state.x_old
     margin = bound - abs(needed)
     if was == UNDECIDED and phase == STICK and before != 0.0:  # it slipped at the start
         was = track.phase = FORWARD
@@ -137,7 +180,8 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
     elif phase == FORWARD and was == STICK and lag == 1 and margin >= 0.0 and p.counts.stuck == p.counts.level:
         phase = STICK if abs(sliding) <= h * bound / c.m else FORWARD  # see `sample`
     if phase == STICK and was != STICK:
-        to_go, change = c.m * abs(before), h * (bound + math.copysign(1.0, before) * needed)
+        to_go = c.m * abs(before)
+        change = h * (bound + math.copysign(1.0, before) * needed)
         at = reached - h + (h * to_go / change if to_go < change else h)
         track.began = at
     elif phase == FORWARD and was == STICK:
@@ -170,17 +214,29 @@ def _disturb(p: Plant, before: float, after: float) -> None:
     side needed)). There a part of the disturbed velocity is kept; before, friction was that of the other side.
     """
     p = borrowed(p)
-    c, t, problem, contact, h, beside = p.c, p.tangent, p.problem, p.layer.contact, p.s.h, p.beside
-    side, was, part, theta, lag = problem.side, t.side, 1.0, 0.0, p.grid.lag
+    c = p.c
+    t = p.tangent
+    problem = p.problem
+    contact = p.layer.contact
+    h = p.s.h
+    beside = p.beside
+    side = problem.side
+    was = t.side
+    part = 1.0
+    theta = 0.0
+    lag = p.grid.lag
     if side != was:
-        needed, bound = _needed(p), c.phi * problem.normal_force
+        needed = _needed(p)
+        bound = c.phi * problem.normal_force
         if side == 0.0 and abs(needed) > bound:  # the step holds, as the shoe turns in it, but friction could not
             side = -math.copysign(1.0, needed)
         elif was == 0.0 and abs(needed) <= bound and abs(after) <= lag * h * bound / c.m:  # see `sample`
             side = 0.0
         if side != was and was != 0.0:
-            to_go, change = c.m * abs(before), h * (bound + was * needed)
-            part, theta = kept(needed, bound), to_go / change if to_go < change else 1.0
+            to_go = c.m * abs(before)
+            change = h * (bound + was * needed)
+            part = kept(needed, bound)
+            theta = to_go / change if to_go < change else 1.0
             meet(beside, part, theta, h, lag)
             t.placed += 1
         t.side = side
@@ -195,24 +251,34 @@ def _disturb(p: Plant, before: float, after: float) -> None:
         behind = ((b.x - b.x_old) / h - v_x if lag == 1 else b.v_x - v_x) / h
         ahead = behind + (side - was) * c.phi * beside.problem.normal_force / c.m
         change = (theta - 0.5 * lag) * h * (part * ahead - behind)
-        b.x, b.v_x = b.x + lag * h * change, b.v_x + change
+        b.x = b.x + lag * h * change
+        b.v_x = b.v_x + change
 
 
 @kernel(void(PLANT, int64), inlined=False)
 def _renew(p: Plant, number: int) -> None:
     """Note the growth of the disturbance up to a sample, and begin anew with one of size one."""
-    t, b = p.tangent, p.beside.state
-    t.x, t.y, t.v_x, t.v_y = b.x, b.y, b.v_x, b.v_y
+    t = p.tangent
+    b = p.beside.state
+    t.x = b.x
+    t.y = b.y
+    t.v_x = b.v_x
+    t.v_y = b.v_y
     part = renew(t, number, p.grid.samples)
     x_old, y_old = (part * (b.x - b.x_old), part * (b.y - b.y_old)) if part > 0.0 else (0.0, 0.0)
-    b.x_old, b.y_old = t.x - x_old, t.y - y_old
-    b.x, b.y, b.v_x, b.v_y = t.x, t.y, t.v_x, t.v_y
+    b.x_old = t.x - x_old
+    b.y_old = t.y - y_old
+    b.x = t.x
+    b.y = t.y
+    b.v_x = t.v_x
+    b.v_y = t.v_y
 
 
 @kernel(void(PLANT, float64, float64))
 def _count(p: Plant, before: float, after: float) -> None:
     """Count how the shoe slides or sticks in a step, with the sliding velocities at both ends (m/s)."""
-    counts, force = p.counts, p.problem.normal_force
+    counts = p.counts
+    force = p.problem.normal_force
     if before * after <= 0.0 and force > 0.0:
         counts.turns += 1
     if after == 0.0:
@@ -220,7 +286,8 @@ def _count(p: Plant, before: float, after: float) -> None:
     else:
         if counts.held <= 1 and after * counts.side < 0.0:  # turned, with a step in stick at most
             counts.crossing = max(counts.crossing, force)
-        counts.side, counts.held = math.copysign(1.0, after), 0
+        counts.side = math.copysign(1.0, after)
+        counts.held = 0
 
 
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
@@ -230,12 +297,22 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.
     """
     p: Plant = _plant_at(address)
-    c, s, grid, layer, state, problem = p.c, p.s, p.grid, p.layer, p.state, p.problem
-    counts, track = p.counts, p.track
-    prepare, finish = _prepare_at(p.plug.prepare), _finish_at(p.plug.finish)
-    solve, belt = _solve_at(p.plug.solve), p.drive.belt
-    row, due = 0, grid.lag % grid.per_sample
-    sampled, part = counts.level // grid.per_sample, counts.level % grid.per_sample
+    c = p.c
+    s = p.s
+    grid = p.grid
+    layer = p.layer
+    state = p.state
+    problem = p.problem
+    counts = p.counts
+    track = p.track
+    prepare = _prepare_at(p.plug.prepare)
+    finish = _finish_at(p.plug.finish)
+    solve = _solve_at(p.plug.solve)
+    belt = p.drive.belt
+    row = 0
+    due = grid.lag % grid.per_sample
+    sampled = counts.level // grid.per_sample
+    part = counts.level % grid.per_sample
     problem.belt_next = value_at(belt, grid.interval * sampled + part * s.h)
     while counts.level < stop:
         if part == due:
@@ -244,8 +321,10 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             if p.tangent.on == 1:
                 _renew(p, sampled)
         # A level's time is that of the sample before it plus whole steps: no rounding piles up.
-        t, t_low = grid.interval * sampled, (part + grid.weighted) * s.h
-        problem.belt_now, problem.belt_next = problem.belt_next, value_at(belt, t + (part + 1) * s.h)
+        t = grid.interval * sampled
+        t_low = (part + grid.weighted) * s.h
+        problem.belt_now = problem.belt_next
+        problem.belt_next = value_at(belt, t + (part + 1) * s.h)
         problem.load = value_at(p.drive.load, t + t_low)
         if layer.pad.wheel_terms > 0:
             travel, travel_low = integral_at(belt, t, t_low)
@@ -253,19 +332,22 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         prepare(c, s, state, problem)
         if state.force > 0.0:  # the guess lies on the parabola through the last three forces
             problem.normal_force = max(3.0 * (state.force - state.force_before) + state.force_earlier, 0.0)
-        state.force_earlier, state.force_before = state.force_before, state.force
+        state.force_earlier = state.force_before
+        state.force_before = state.force
         outcome, evaluations, rising = solve(layer, problem, grid.most)
         counts.evaluations, counts.most = counts.evaluations + evaluations, max(counts.most, evaluations)
         counts.rising += 1 if rising > 0 else 0
         if outcome != SOLVED:
             if counts.unconverged < events.shape[0]:
-                events[counts.unconverged, 0], events[counts.unconverged, 1] = t + t_low, problem.residual
+                events[counts.unconverged, 0] = t + t_low
+                events[counts.unconverged, 1] = problem.residual
             counts.unconverged += 1
             if grid.go_on == 0 or not math.isfinite(problem.normal_force):
                 return _UNCONVERGED
         if layer.contact.valid == 0:
             return _NOT_CLOSED
-        v_before, before = state.v_x, state.v_x - problem.belt_now
+        v_before = state.v_x
+        before = state.v_x - problem.belt_now
         finish(c, s, state, problem, layer.contact, p.work)
         after = state.v_x - problem.belt_next
         if p.tangent.on == 1:
@@ -284,7 +366,8 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         counts.stuck = counts.level if problem.side == 0.0 else counts.stuck
         part += 1
         if part == grid.per_sample:
-            sampled, part = sampled + 1, 0
+            sampled = sampled + 1
+            part = 0
         if stopped(layer.pad.signals):
             break
     return _NONE

@@ -59,7 +59,8 @@ Counted = Callable[[str, int, int], None]
 
 _NO_TRACK = new(TRACK)
 """Track of motions that are not tracked: nothing is written into it."""
-_plant_at, _evaluate_at = from_memory(PLANT), at_address(EVALUATE)
+_plant_at = from_memory(PLANT)
+_evaluate_at = at_address(EVALUATE)
 
 
 @kernel(void(int64, float64, float64, float64, float64))
@@ -157,12 +158,14 @@ class Stepping:
     def __init__(self, system: System) -> None:
         """Put the shoe at its start; raises RefusedError where the way to the end is too long."""
         system.refuse_steps(0.0)
-        self.system, self.scheme = system, system.scheme
+        self.system = system
+        self.scheme = system.scheme
         self.work = Work()
         self.events = np.zeros((EVENTS, 2))
         self.counts = new(COUNTS)
         self.counts.level = self.scheme.LAG
-        self.tangent, self.track = new(TANGENT), new(TRACK) if system.tracked else _NO_TRACK
+        self.tangent = new(TANGENT)
+        self.track = new(TRACK) if system.tracked else _NO_TRACK
         # the same place in memory, which is read in a tenth of the time
         self._level = np.frombuffer(self.counts, COUNTS)["level"]
         self.plant = Plant(
@@ -188,8 +191,11 @@ class Stepping:
         self.scheme.hold(self.plant, self._plant_at)
         self._begin()
         if system.start_error is not None:
-            self.tangent.knows, self.tangent.unsure, self.tangent.moved = 1, math.inf, math.inf
-            self.tangent.error[0, :2], self.tangent.most = system.start_error, system.most_error
+            self.tangent.knows = 1
+            self.tangent.unsure = math.inf
+            self.tangent.moved = math.inf
+            self.tangent.error[0, :2] = system.start_error
+            self.tangent.most = system.most_error
         if system.tracked:
             follow(self.track, self.plant.state.v_x)
         self._start_energy = self._energy()
@@ -199,9 +205,12 @@ class Stepping:
     ) -> Motion:
         """Step to the end or to a failure; the arguments are those of `solve`."""
         self.system.refuse_steps(0.0 if sink else 8.0 * len(HISTORY) * self.system.samples)
-        lag, work, kept = self.scheme.LAG, self.work, [np.zeros((0, len(HISTORY)))]
+        lag = self.scheme.LAG
+        work = self.work
+        kept = [np.zeros((0, len(HISTORY)))]
         sink = sink or kept.append
-        last, most = self.system.steps + lag, BLOCK_ROWS * self.system.per_sample
+        last = self.system.steps + lag
+        most = BLOCK_ROWS * self.system.per_sample
         size = min(EXACT_BLOCK if self.system.method.row.exact else first_block, most)
         while not work.failed and self.counts.level < last:
             start = time.perf_counter()
@@ -241,24 +250,34 @@ class Stepping:
 
     def block(self, stop: int) -> Floats:
         """Step to level `stop`; the samples on the way."""
-        system, lag, per_sample = self.system, self.scheme.LAG, self.system.per_sample
+        system = self.system
+        lag = self.scheme.LAG
+        per_sample = self.system.per_sample
         first = self._level.item() - lag
         rows = np.empty((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        failure, done = self.scheme.advance(self._plant_at, rows, self.events, stop), self._level.item() - lag
+        failure = self.scheme.advance(self._plant_at, rows, self.events, stop)
+        done = self._level.item() - lag
         if failure:
-            self.work.failure, self.work.failure_time = Failure(failure), system.step * done
+            self.work.failure = Failure(failure)
+            self.work.failure_time = system.step * done
             done += 1  # the sample of the failing step's own level has been taken
         return rows if done == stop - lag else rows[: -(-done // per_sample) + (-first // per_sample)]
 
     def _begin(self) -> None:
         """Fill the state at the scheme's first level, with the contact force there as the first guess."""
-        system, initial, plant = self.system, self.system.initial, self.plant
-        x, y = initial.x, initial.y
+        system = self.system
+        initial = self.system.initial
+        plant = self.plant
+        x = initial.x
+        y = initial.y
         if initial.from_equilibrium:
             rest = steady_sliding(system)
-            x, y = x + rest.x, y + rest.y
+            x = x + rest.x
+            y = y + rest.y
         self._evaluate_at(x, y, 0.0)
-        velocity, acceleration, found = (initial.vx, initial.vy), (0.0, 0.0), plant.layer.contact
+        velocity = (initial.vx, initial.vy)
+        acceleration = (0.0, 0.0)
+        found = plant.layer.contact
         if system.method.start == "consistent":
             acceleration = _acceleration(system, (x, y), velocity, found.normal_force)
         self.scheme.begin(plant.s, plant.state, (x, y), velocity, acceleration)
@@ -280,7 +299,8 @@ class Stepping:
         return float(kinetic), float(links), float(plant.layer.contact.store)
 
     def _count(self) -> None:
-        counts, work = self.counts, self.work
+        counts = self.counts
+        work = self.work
         work.steps = int(counts.kinds.sum())
         if self.system.method.row.exact:
             work.rounding = self.plant.state.largest.copy(), self.plant.state.worst.copy()
@@ -288,14 +308,18 @@ class Stepping:
         work.unconverged_steps = int(counts.unconverged)
         work.non_unique_steps = int(counts.rising)
         work.most_evaluations = int(counts.most)
-        work.turns, work.crossing = int(counts.turns), float(counts.crossing)
+        work.turns = int(counts.turns)
+        work.crossing = float(counts.crossing)
         work.evaluators = {kind: int(n) for kind, n in zip(contact.kinds(), counts.kinds, strict=False) if n}
         work.unconverged = self.events[: min(work.unconverged_steps, EVENTS)].copy()
 
 
 def _acceleration(system: System, position: Pair, velocity: Pair, force: float) -> Pair:
     """(ẍ, ÿ) of (6)-(7) at t = 0; where the shoe moves with the wheel, friction decides as in a step."""
-    c, load, (x, y), (v_x, v_y) = system.coefficients, system.load_at_start, position, velocity
+    c = system.coefficients
+    load = system.load_at_start
+    x, y = position
+    v_x, v_y = velocity
     g_1 = -(c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + load * c.sin_beta)  # Eq. (6)
     g_2 = force - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + load * c.cos_beta)  # Eq. (7)
     sliding = v_x - system.belt_speed

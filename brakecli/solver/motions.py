@@ -7,7 +7,9 @@ from brakecli.solver.records import record
 X, Y, V_X, V_Y = range(4)
 """Components of an event-driven motion, the last index of its arrays."""
 
-STAGES, POWERS, POWERED = 16, 7, 5
+STAGES = 16
+POWERS = 7
+POWERED = 5
 """Stages of its steps, coefficients of its continuous solution, works that it adds up."""
 
 MOTION = record(
@@ -48,7 +50,12 @@ MOTION = record(
 BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
 """Further components of a piecewise-exact motion, beside those of an event-driven one: U, Q and their slopes."""
 
-SIZE, PHASES, MARGINS, WORKS, TERMS, NODES = 8, 4, 3, 4, 18, 6
+SIZE = 8
+PHASES = 4
+MARGINS = 3
+WORKS = 4
+TERMS = 18
+NODES = 6
 """Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
 PAIRS = SIZE * (SIZE + 1) // 2
 """Products of two components."""
@@ -92,4 +99,5 @@ FLOW = record(
 )
 """A piecewise-exact motion with the matrices of its phases."""
 
-MOTION_TYPE, FLOW_TYPE = numba.from_dtype(MOTION), numba.from_dtype(FLOW)
+MOTION_TYPE = numba.from_dtype(MOTION)
+FLOW_TYPE = numba.from_dtype(FLOW)

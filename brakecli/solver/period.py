@@ -12,7 +12,8 @@ SAME = 1e-15  # relative difference of ratios that are the same but for rounding
 
 def common_period(system: System) -> float | None:
     """The time (s) after which all waves of the wheel repeat; None where there is none, or none short enough."""
-    turns, belt = system.wheel.turns, abs(system.belt_speed)
+    turns = system.wheel.turns
+    belt = abs(system.belt_speed)
     if belt == 0.0 or not turns.size:
         return None
     ratios = [Fraction(turn / turns[0]).limit_denominator(LARGEST_DENOMINATOR) for turn in turns.tolist()]

@@ -67,7 +67,8 @@ class Failure(IntEnum):
     def __new__(cls, number: int, sentence: str = "") -> Self:
         """The number that a loop returns, with its sentence."""
         failure = int.__new__(cls, number)
-        failure._value_, failure.sentence = number, sentence
+        failure._value_ = number
+        failure.sentence = sentence
         return failure
 
     NONE = 0, "the run reached its end"

@@ -110,10 +110,13 @@ def turned(f: Surface, travel: float, travel_low: float = 0.0) -> Surface:
 @kernel(void(float64, float64, LAYER))
 def turn(travel: float, travel_low: float, layer: Layer) -> None:
     """The wheel has travelled so far (m): its phases, or its place on the grid of the window."""
-    window, at, n = layer.window, layer.pad.turns_at, layer.angles.size
+    window = layer.window
+    at = layer.pad.turns_at
+    n = layer.angles.size
     if window.rows == 0:
         wheel_angles(layer.tables[at : at + 3 * n], travel, travel_low, layer.angles)
         return
     points = np.floor(travel / window.spacing + 0.5)
     grid, grid_low = two_product(points, window.spacing)
-    window.points, window.travel = points, (travel - grid) + (travel_low - grid_low)
+    window.points = points
+    window.travel = (travel - grid) + (travel_low - grid_low)

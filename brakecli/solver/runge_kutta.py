@@ -59,7 +59,9 @@ A[1, 4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
 A[1, 5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
 A[1, END_STAGE, :6] = 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 
-THIRD, FIFTH, DENSE = np.zeros((2, STAGES)), np.zeros((2, STAGES)), np.zeros((2, POWERS - 3, STAGES))
+THIRD = np.zeros((2, STAGES))
+FIFTH = np.zeros((2, STAGES))
+DENSE = np.zeros((2, POWERS - 3, STAGES))
 THIRD[0, : END_STAGE + 1] = _numbers("""
     -0.18980075407240762 0 0 0 0 4.450312892752409 1.8915178993145003 -5.801203960010585 -0.4226823213237919
     -0.1521609496625161 0.20136540080403034 0.02265179219836082 0
@@ -68,7 +70,8 @@ FIFTH[0, : END_STAGE + 1] = _numbers("""
     0.01312004499419488 0 0 0 0 -1.2251564463762044 -0.4957589496572502 1.6643771824549864 -0.35032884874997366
     0.3341791187130175 0.08192320648511571 -0.022355307863886294 0
 """)
-FIFTH[1, :6], FIFTH[1, END_STAGE] = (71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525), -1 / 40
+FIFTH[1, :6] = (71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525)
+FIFTH[1, END_STAGE] = -1 / 40
 """What the step differs by from formulas of order three and five, of DOPRI5 from one of order four."""
 
 DENSE[0] = _numbers("""
@@ -96,7 +99,10 @@ DENSE[1, 0, [0, 2, 3, 4, 5, END_STAGE]] = (
 @kernel(types.UniTuple(float64, 4)(MOTION_TYPE, int64))
 def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
     """Σ A[stage, j] k_j of every component: what the step so far advances by, over the step."""
-    x, y, v_x, v_y = 0.0, 0.0, 0.0, 0.0
+    x = 0.0
+    y = 0.0
+    v_x = 0.0
+    v_y = 0.0
     pair = m.pair
     for j in range(stage if pair == 0 else min(stage, USED[pair])):
         weight = A[pair, stage, j]
@@ -113,7 +119,9 @@ def local_error(m: Any, component: int) -> float:
 
     e_5²/√(e_5² + e_3²/100), each e a sum of weighted slopes; of DOPRI5 |e| itself.
     """
-    third, fifth, pair = 0.0, 0.0, m.pair
+    third = 0.0
+    fifth = 0.0
+    pair = m.pair
     for j in range(USED[pair]):
         third += THIRD[pair, j] * m.slopes[j, component]
         fifth += FIFTH[pair, j] * m.slopes[j, component]
@@ -131,7 +139,8 @@ def make_continuous(m: Any, h: float) -> None:
     """
     pair = m.pair
     for i in range(4):
-        first, last = h * m.slopes[0, i], h * m.slopes[END_STAGE, i]
+        first = h * m.slopes[0, i]
+        last = h * m.slopes[END_STAGE, i]
         change = m.end[i] - m.begin[i]
         m.powers[0, i] = change
         m.powers[1, i] = first - change
@@ -149,7 +158,8 @@ def interpolated(m: Any, component: int, theta: float) -> float:
 
     u = u_0 + θ (p_0 + (1 - θ) (p_1 + θ (p_2 + (1 - θ) (p_3 + …)))).
     """
-    total, rest = 0.0, 1.0 - theta
+    total = 0.0
+    rest = 1.0 - theta
     for p in range(TERMS[m.pair] - 1, -1, -1):
         total = (total + m.powers[p, component]) * (theta if p % 2 == 0 else rest)
     return m.begin[component] + total  # type: ignore[no-any-return]
@@ -172,7 +182,9 @@ def reach(m: Any, component: int) -> float:
 @kernel(types.UniTuple(float64, 2)(MOTION_TYPE, int64, float64))
 def interpolated_both(m: Any, component: int, theta: float) -> tuple[float, float]:
     """`interpolated`, and its derivative by theta."""
-    total, slope, rest = 0.0, 0.0, 1.0 - theta
+    total = 0.0
+    slope = 0.0
+    rest = 1.0 - theta
     for p in range(TERMS[m.pair] - 1, -1, -1):
         total += m.powers[p, component]
         if p % 2 == 0:

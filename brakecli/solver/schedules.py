@@ -23,7 +23,8 @@ Schedule = NDArray[Any]
 def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0) -> Schedule:
     """Schedule through (times, scale * values); equal values make a constant. The times increase strictly."""
     if len({*values}) == 1:
-        times, values = (0.0,), values[:1]
+        times = (0.0,)
+        values = values[:1]
     t = [Fraction(time) for time in times]
     v = [Fraction(value) * Fraction(scale) for value in values]
     slopes = [(v[i + 1] - v[i]) / (t[i + 1] - t[i]) for i in range(len(t) - 1)] + [Fraction(0)]
@@ -40,7 +41,8 @@ def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0
 @kernel(int64(KNOTS, float64))
 def segment(s: Schedule, t: float) -> int:
     """Index of the last knot at or before t, -1 before the first."""
-    low, high = -1, s.size
+    low = -1
+    high = s.size
     while high - low > 1:
         middle = (low + high) // 2
         if s[middle].time <= t:
@@ -74,9 +76,11 @@ def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
     """
     t, t_low = two_sum(t, t_low)
     k = max(segment(s, t), 0)
-    slope, slope_low = s[k].slope, s[k].slope_low
+    slope = s[k].slope
+    slope_low = s[k].slope_low
     if t < s[0].time:
-        slope, slope_low = 0.0, 0.0
+        slope = 0.0
+        slope_low = 0.0
     after, after_low = two_sum(t, -s[k].time)
     after, after_low = add(after, after_low, t_low, 0.0)
     mean, mean_low = multiply(after, after_low, 0.5 * slope, 0.5 * slope_low)

@@ -10,7 +10,9 @@ from brakecli.solver.compile import kernel
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: a sum with it is rounded to a whole number
 _QUARTERS = 0.6366197723675814  # 2/pi
-_QUARTER, _QUARTER_LOW = 1.57079632673412561417, 6.07710050650619224932e-11  # pi/2; the first has 33 bits
+# pi/2; the first has 33 bits
+_QUARTER = 1.57079632673412561417
+_QUARTER_LOW = 6.07710050650619224932e-11
 
 
 @kernel(types.UniTuple(float64, 2)(float64))

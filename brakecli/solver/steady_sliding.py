@@ -23,7 +23,9 @@ PLACES = 1024
 """Positions of the wheel that an average takes, in all stretches, each as long as 50 of its longest waves."""
 _LONGEST = 50.0
 TABLE = 129
-_HEIGHT, _RELATIVE = 1e-15, 1e-14  # errors of y: over the roughness, and over itself; a few units of rounding
+# errors of y: over the roughness, and over itself; a few units of rounding
+_HEIGHT = 1e-15
+_RELATIVE = 1e-14
 PRESSED = 1e-6
 """Least normal force of a pressed shoe, as a part of the load. Below it the force is a difference of numbers that
 are a million times as large, and a small change of any of them lifts the shoe off."""
@@ -93,7 +95,8 @@ def mean_contacts(system: System, y: float) -> Floats:
     mirror images have the same averages. From window to window they are shifted by a part of their distance:
     together they sample a wave that closes as finely as all of them would.
     """
-    pad, wheel = system.pad.constants, system.wheel
+    pad = system.pad.constants
+    wheel = system.wheel
     covered = coverage(y, pad)
     length = 2.0 * pad.half_length
     if covered == CLEAR:
@@ -105,7 +108,8 @@ def mean_contacts(system: System, y: float) -> Floats:
     if wheel.g.size == 0:
         add_places(y, np.zeros(1), np.ones(1), layer, found[0])
         return np.tile(found[0], (WINDOWS, 1))
-    window, each = averaged_length(system) / WINDOWS, PLACES // WINDOWS
+    window = averaged_length(system) / WINDOWS
+    each = PLACES // WINDOWS
     for k in range(WINDOWS):
         parts = (np.arange(each) + (k + 0.5) / WINDOWS) / each
         weights = 2.0 * np.sin(np.pi * parts) ** 2
@@ -156,8 +160,10 @@ def tabulated(system: System, window: int | None = None) -> Mean:
 
     `window`: by the average over one of the windows alone.
     """
-    mean, pad = partial(mean_contact, system), system.pad.constants
-    full, top = float(pad.full_up_to), float(pad.clear_from)
+    mean = partial(mean_contact, system)
+    pad = system.pad.constants
+    full = float(pad.full_up_to)
+    top = float(pad.clear_from)
     profiles = [each.tobytes() for profile in (system.shoe, system.wheel) for each in profile]
     surfaces = _Surfaces((system.half_length, system.evaluator, system.nodes, *profiles), system)
     k = system.layer_stiffness
@@ -179,23 +185,29 @@ def steady_sliding(
     With F_x = sign(U) phi F_y, (6) gives x for a height y and (7) remains: one equation in y. U (m/s) and phi are
     those of the system unless they are given. Raises CaseError where there is no solution.
     """
-    c, pad, load = system.coefficients, system.pad.constants, system.load_at_start
+    c = system.coefficients
+    pad = system.pad.constants
+    load = system.load_at_start
     mean = mean or partial(mean_contact, system)
     grip = float(np.sign(system.belt_speed if belt is None else belt)) * (c.phi if phi is None else phi)
-    q_x, q_y = load * c.sin_beta, load * c.cos_beta
+    q_x = load * c.sin_beta
+    q_y = load * c.cos_beta
     if c.c_xx > 0.0:
         lean = c.c_xy / c.c_xx
     elif grip == 0.0 and q_x == 0.0:
         lean = 0.0
     else:
         raise _none("no link holds the shoe along the wheel")
-    spring, push = c.c_yy - lean * c.c_xy, q_y - lean * q_x
+    spring = c.c_yy - lean * c.c_xy
+    push = q_y - lean * q_x
     uplift = 1.0 - lean * grip  # of F_y, after what its friction takes away through the links
 
     def unbalanced(y: float) -> float:
         return spring * y + push - uplift * mean(y)[0]
 
-    full, top, stiffness = float(pad.full_up_to), float(pad.clear_from), system.contact_stiffness
+    full = float(pad.full_up_to)
+    top = float(pad.clear_from)
+    stiffness = system.contact_stiffness
     whole = spring + uplift * stiffness
     y = -(push + uplift * stiffness * pad.shoe_mean) / whole if whole != 0.0 else np.inf
     if not y <= full:

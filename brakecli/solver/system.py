@@ -97,7 +97,8 @@ class System:
     @cached_property
     def table_bytes(self) -> float:
         """Memory of the contact: values at nodes, a window, two numbers for each pair of waves."""
-        terms, nodes = len(self.shoe.g) + len(self.wheel.g), self.nodes
+        terms = len(self.shoe.g) + len(self.wheel.g)
+        nodes = self.nodes
         at_nodes = nodes * (2.0 * len(self.wheel.g) + 3.0) + self.window_rows * window_width(nodes)
         return 8.0 * (at_nodes + 2.0 * terms**2)
 
@@ -239,7 +240,8 @@ class System:
     @property
     def grid(self) -> Grid:
         """The grid of time as the loop sees it."""
-        method, scheme = self.method, self.scheme
+        method = self.method
+        scheme = self.scheme
         return Grid(
             self.interval,
             self.per_sample,

@@ -25,13 +25,15 @@ BATCHES = 8
 """Batches of the parts of the second half of a run; of twice as many parts each, half as many."""
 ALIKE = 4
 """Sizes of a group that may leave the line of `even` together: an eighth of a run."""
-PLACED, PLACED_LAGGING = 1 / 16, 1 / 4
+PLACED = 1 / 16
+PLACED_LAGGING = 1 / 4
 """Parts of a step by which the growth may be off at an event inside it. The first is for schemes whose velocity is
 that of the level reached, the second for those whose velocity lags. Limit cycles, whose exponent is 0, have shown
 0.06 and 0.34."""
 FEWEST_SAMPLES = 64
 """Fewest samples of a run with an exponent: its growth is noted at them."""
-LEAST, MOST = 1e-280, 1e280
+LEAST = 1e-280
+MOST = 1e280
 """Size of a disturbance."""
 MOST_POWERS = 700.0
 """Powers of e by which anything may grow or fade: e^709 is beyond all numbers."""
@@ -50,7 +52,8 @@ def seed(t: Any, state: Any, h: float) -> None:
     """Begin with a disturbance of size one in no particular direction; `state` is that of a difference scheme."""
     t.on = 1
     t.x, t.y, t.v_x, t.v_y = state.x, state.y, state.v_x, state.v_y = 0.5 / t.rate, 0.5 / t.rate, 0.5, -0.5
-    state.x_old, state.y_old = state.x - h * state.v_x, state.y - h * state.v_y
+    state.x_old = state.x - h * state.v_x
+    state.y_old = state.y - h * state.v_y
 
 
 def exponents(logs: Floats, duration: float) -> list[Exponent]:
@@ -122,17 +125,28 @@ def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: floa
     In slip a11 δd + a12 δe = δg1 - side φ δF and a12 δd + a22 δe = δg2 + δF; in stick δd = 0. In both δF = ∂F_y/∂x
     δx + ∂F_y/∂y δy.
     """
-    b, grip = beside.problem, -side * c.phi
-    a_11, a_12, a_22 = of.a_11, of.a_12, of.a_22
+    b = beside.problem
+    grip = -side * c.phi
+    a_11 = of.a_11
+    a_12 = of.a_12
+    a_22 = of.a_22
     if side == 0.0:
-        d, d_slope, e, e_slope = 0.0, 0.0, b.g_2 / a_22, 1.0 / a_22
+        d = 0.0
+        d_slope = 0.0
+        e = b.g_2 / a_22
+        e_slope = 1.0 / a_22
     else:
         part = 1.0 / (a_11 * a_22 - a_12 * a_12)
-        d, e = part * (b.g_1 * a_22 - b.g_2 * a_12), part * (b.g_2 * a_11 - b.g_1 * a_12)
-        d_slope, e_slope = part * (grip * a_22 - a_12), part * (a_11 - grip * a_12)
-    x, y = b.x_0 + b.gain * d, b.y_0 + b.gain * e
+        d = part * (b.g_1 * a_22 - b.g_2 * a_12)
+        e = part * (b.g_2 * a_11 - b.g_1 * a_12)
+        d_slope = part * (grip * a_22 - a_12)
+        e_slope = part * (a_11 - grip * a_12)
+    x = b.x_0 + b.gain * d
+    y = b.y_0 + b.gain * e
     force = (tangential * x - stiffness * y) / (1.0 - b.gain * (tangential * d_slope - stiffness * e_slope))
-    b.d, b.e, b.normal_force = d + d_slope * force, e + e_slope * force, force
+    b.d = d + d_slope * force
+    b.e = e + e_slope * force
+    b.normal_force = force
 
 
 @kernel(float64(TANGENT_TYPE, int64, int64))
@@ -145,8 +159,14 @@ def renew(t: Any, number: int, samples: int) -> float:
     if number > 0:
         t.logs[(number - 1) * PARTS // samples] += math.log(min(max(size, LEAST), MOST))
     if not LEAST < size < MOST:
-        t.x, t.y, t.v_x, t.v_y = 1.0 / t.rate, 0.0, 0.0, 0.0
+        t.x = 1.0 / t.rate
+        t.y = 0.0
+        t.v_x = 0.0
+        t.v_y = 0.0
         return 0.0
     part = 1.0 / size
-    t.x, t.y, t.v_x, t.v_y = part * t.x, part * t.y, part * t.v_x, part * t.v_y
+    t.x = part * t.x
+    t.y = part * t.y
+    t.v_x = part * t.v_x
+    t.v_y = part * t.v_y
     return part

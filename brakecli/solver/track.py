@@ -131,7 +131,10 @@ UNTRACKED = Track(
 
 def follow(t: Any, v_x: float) -> None:
     """Note all from the start on, with the velocity there (m/s)."""
-    t.on, t.phase, t.way, t.since = 1, automaton.UNDECIDED, np.sign(v_x), -math.inf
+    t.on = 1
+    t.phase = automaton.UNDECIDED
+    t.way = np.sign(v_x)
+    t.since = -math.inf
 
 
 def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool) -> Track:
@@ -152,12 +155,16 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
 @kernel(types.Array(float64, 1, "C")(TRACK_TYPE, WORK_TYPE, int64, int64, float64, float64), inlined=False)
 def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float) -> Floats:
     """Make a mark at a sample, and say when the next one is due; the row that gets the state there."""
-    at, parts = t.marks, min(PARTS, samples)
+    at = t.marks
+    parts = min(PARTS, samples)
     t.times[at] = time
     w = t.works[at]
-    w[0], w[1], w[2], w[3], w[4], w[5] = (
-        work.belt, work.friction, work.dashpots, work.load, work.roughness, work.scheme,
-    )  # fmt: skip
+    w[0] = work.belt
+    w[1] = work.friction
+    w[2] = work.dashpots
+    w[3] = work.load
+    w[4] = work.roughness
+    w[5] = work.scheme
     t.states[at, 6] = store
     t.marks = at + 1
     t.next = ((number * parts // samples + 1) * samples + parts - 1) // parts
@@ -170,7 +177,9 @@ def put(t: Any, kind: int, time: float, x: float) -> None:
     at = t.events % MOST_EVENTS
     if t.events >= MOST_EVENTS:
         t.since = max(t.since, t.event_times[at])
-    t.event_times[at], t.event_kinds[at], t.event_places[at] = time, kind, x
+    t.event_times[at] = time
+    t.event_kinds[at] = kind
+    t.event_places[at] = x
     t.events += 1
     t.counts[kind] += 1
 
@@ -178,7 +187,9 @@ def put(t: Any, kind: int, time: float, x: float) -> None:
 @kernel(void(TRACK_TYPE, int64, *[float64] * 5), inlined=False)
 def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """Note the events with which a phase begins, and the motion there; the first one begins without any."""
-    was, t.phase, before = t.phase, phase, t.events
+    was = t.phase
+    t.phase = phase
+    before = t.events
     if was == automaton.UNDECIDED or was == phase:
         return
     if was == automaton.STICK:
@@ -193,7 +204,9 @@ def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: 
         put(t, TURN, time, x)
     for at in range(before, t.events):
         others = t.event_others[at % MOST_EVENTS]
-        others[0], others[1], others[2] = y, v_x, v_y
+        others[0] = y
+        others[1] = v_x
+        others[2] = v_y
 
 
 @kernel(int64(TRACK_TYPE, float64))

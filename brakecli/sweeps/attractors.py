@@ -63,18 +63,23 @@ class Attractors:
         known &= dies | (journal.column("settled") == 1)
         kinds = np.where(dies, 0, np.where(excitation == Excitation.FORCED.encode(), 1, 2))[known]
         values = np.where(kinds, [journal.column(name)[known] for name in _NUMBERS], 0.0)
-        numbers, apart = np.zeros(regime.shape, np.int64), _comparable(values)
+        numbers = np.zeros(regime.shape, np.int64)
+        apart = _comparable(values)
         numbers[known] = told = 1 + _grouped(kinds, apart)
-        found, sentences = list[Attractor](), list[str]()
+        found = list[Attractor]()
+        sentences = list[str]()
         for number in range(1, int(told.max(initial=0)) + 1):
-            chosen, here = told == number, numbers == number
+            chosen = told == number
+            here = numbers == number
             amplitude, frequency, *parts = np.median(values[:, chosen], axis=1).tolist()
             share = Probability.within(here.reshape(1, -1), ~known.reshape(1, -1))
-            words, count = (_most(regime[here]), _most(excitation[here])), int(here.sum())
+            words = (_most(regime[here]), _most(excitation[here]))
+            count = int(here.sum())
             tone = frequency if frequency > 0.0 else None
             found.append(Attractor(number, *words, count, share, amplitude, tone, *parts))
             if np.ptp(apart[:, chosen], axis=1).max() > 2.0:
-                low, high = values[0, chosen].min(), values[0, chosen].max()
+                low = values[0, chosen].min()
+                high = values[0, chosen].max()
                 what = f"attractor {number} holds motions with amplitudes of {low:.3g} to {high:.3g} m"
                 sentences.append(f"{what}, and no gap between them: run longer, to see whether they are one")
         if missing := int((~known).sum()):
@@ -102,7 +107,8 @@ def _grouped(kinds: NDArray[Any], apart: NDArray[np.float64]) -> NDArray[np.int6
 
     Groups are counted by kind, and then by the medians of their numbers, amplitudes first.
     """
-    groups, count = np.unique(kinds, return_inverse=True)[1], 0
+    groups = np.unique(kinds, return_inverse=True)[1]
+    count = 0
     while groups.max(initial=-1) + 1 > count:
         count = groups.max() + 1
         for row in apart:

@@ -31,7 +31,9 @@ _STEP_SECONDS = 1.1e-5  # of a motion on rough pads, with its derivative
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
 _RECORD_BYTES = 150.0  # of a point in the journal, and in the result
-_POINT_BYTES, _FOLLOWED_BYTES = 20.0, 400.0  # in the parent, which writes lines that are followed all at once
+# in the parent, which writes lines that are followed all at once
+_POINT_BYTES = 20.0
+_FOLLOWED_BYTES = 400.0
 
 
 @dataclass(frozen=True)
@@ -52,8 +54,10 @@ class Estimate:
 
     def sentence(self) -> str:
         """The estimate in words."""
-        noun, crew = ("point" if self.points == 1 else "points"), ("worker" if self.workers == 1 else "workers")
-        about, on = ("at least" if self.at_least else "about"), f" on {self.workers} {crew}" * bool(self.workers)
+        noun = "point" if self.points == 1 else "points"
+        crew = "worker" if self.workers == 1 else "workers"
+        about = "at least" if self.at_least else "about"
+        on = f" on {self.workers} {crew}" * bool(self.workers)
         return (
             f"{self.points} {noun}{on}: {about} {duration_text(self.seconds)}, "
             f"{self.memory / 1e6:.0f} MB of memory, a file of {self.file_size / 1e6:.2g} MB"
@@ -66,26 +70,34 @@ def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
     `spare`: there are no workers where they would take longer to start than the points take. Searches are computed
     with them where verdicts come early, or eigenvalues answer; others take too long, and are guessed.
     """
-    samples, tables, forced, dearest, early = 0, 0.0, 0.0, 0.0, True
-    failing, critical = list[str](), plan.sweep.critical
+    samples = 0
+    tables = 0.0
+    forced = 0.0
+    dearest = 0.0
+    early = True
+    failing = list[str]()
+    critical = plan.sweep.critical
     by_simulation = critical is not None and critical.method == "simulation"
     for point in sorted({0, plan.points - 1}):
         with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
             refuse(found := check(system))
             dearest = max(dearest, found.seconds)
-            samples, early = max(samples, system.samples), early and may_be_early(system)
+            samples = max(samples, system.samples)
+            early = early and may_be_early(system)
             tables = max(tables, system.table_bytes)
             if critical is not None and by_simulation:
                 forced = max(forced, _forced_seconds(plan, plan.settings(point), critical))
     guessed = by_simulation and (forced > 0.0 or not early)
     pilot = Pilot(plan, workers, with_searches=not guessed)
     pilot.look()
-    each, samples = pilot.seconds, max(samples, pilot.samples)
+    each = pilot.seconds
+    samples = max(samples, pilot.samples)
     at_least = guessed or pilot.at_least or dearest > UNEVEN * pilot.guess
     if guessed:
         each += _SEARCH_RUNS * each + _SMOOTH_SECONDS + forced
-    records, in_parent = plan.passes * plan.points, _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
+    records = plan.passes * plan.points
+    in_parent = _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
     if spare and not at_least and plan.units * plan.unit_length * each < WORKER_SECONDS:
         workers = pilot.workers = 0
     held = _SAMPLE_BYTES * samples * max(workers, 1) * pilot.together

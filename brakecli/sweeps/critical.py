@@ -52,7 +52,9 @@ def search(critical: Critical, line: Line) -> Search:
     if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
     case = case_at(critical.lower)
-    explorer, found, waves = explored(critical, case), exact, bool(system_of(case).wheel.g.size)
+    explorer = explored(critical, case)
+    found = exact
+    waves = bool(system_of(case).wheel.g.size)
     answers = Answers(explorer.explored, line.own)
     if waves:
         repeats = explorer.waves is not None
@@ -99,7 +101,8 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
     @cache
     def signs_at(value: float) -> Signs:
         try:
-            system, links = system_of(case_at(value)), links_of(case_at(value))
+            system = system_of(case_at(value))
+            links = links_of(case_at(value))
         except CaseError:
             return None
         grip = system.coefficients.grip(system.belt_speed)
@@ -172,7 +175,8 @@ def _certain(
 
     stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
     while hidden(stable) and stable != bound:
-        stable, stride = (max if lost else min)(stable + stride, bound), 2.0 * stride
+        stable = (max if lost else min)(stable + stride, bound)
+        stride = 2.0 * stride
     low, high = (stable, high) if lost else (low, stable)
     return Edge(0.5 * (low + high), 0.5 * (high - low))
 
@@ -180,7 +184,8 @@ def _certain(
 def _friction_by_eigenvalues(critical: Critical, case: Case) -> Search:
     """The first loss of stability within the range of φ, otherwise the first regain."""
     system = system_of(case)
-    report, links = stability(system), links_of(case)
+    report = stability(system)
+    links = links_of(case)
 
     @cache
     def signs_at(phi: float) -> Signs:
@@ -188,7 +193,9 @@ def _friction_by_eigenvalues(critical: Critical, case: Case) -> Search:
         return conditions(links, k, math.copysign(phi, report.belt_speed)) if math.isfinite(k) else None
 
     within = [each.friction for each in report.crossings if critical.lower <= each.friction <= critical.upper]
-    ends, edges, unstable = [critical.lower, *within, critical.upper], list[Edge](), not report.stable
+    ends = [critical.lower, *within, critical.upper]
+    edges = list[Edge]()
+    unstable = not report.stable
     middles = [0.5 * (low + high) for low, high in pairwise(ends)]
     for phi, (low, high) in zip(within, pairwise(middles), strict=True):
         if _grows(signs_at(low)) is not _grows(signs_at(high)):  # otherwise rounding hides both ends of a window

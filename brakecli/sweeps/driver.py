@@ -32,7 +32,9 @@ TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
 TASKS_A_SECOND = 100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
 LONGEST_TASK = 1.0  # s of work, in the middle of long sweeps: a task costs a cluster some 5 ms of a core,
 PART_OF_REST = 0.01  # and no more than this part of what a worker has still to do: all end at about the same time
-LARGEST_TASK, FEW_WORKERS = 1000, 100  # points, for so many workers; in proportion for more
+# points, for so many workers; in proportion for more
+LARGEST_TASK = 1000
+FEW_WORKERS = 100
 
 
 class TaskQueue:
@@ -46,10 +48,14 @@ class TaskQueue:
         edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
         self._tasks = deque([Task(first, end - first) for first, end in edges])
         self._left = sum(task.size for task in self._tasks)
-        self._size, self._least, self._task_seconds = size, least, max(TASK_SECONDS, workers / TASKS_A_SECOND)
+        self._size = size
+        self._least = least
+        self._task_seconds = max(TASK_SECONDS, workers / TASKS_A_SECOND)
         self._part_of_rest = PART_OF_REST / workers
         self._most = max(LARGEST_TASK, LARGEST_TASK * workers // FEW_WORKERS)
-        self.seconds, self.units = 0.0, 0  # computed so far
+        # computed so far
+        self.seconds = 0.0
+        self.units = 0
 
     def next_task(self) -> Task | None:
         """The next task, None where there is none now."""
@@ -132,7 +138,8 @@ def sweep(
     RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a point
     that fails is marked and reported.
     """
-    plan, start = loaded.plan, time.perf_counter()
+    plan = loaded.plan
+    start = time.perf_counter()
     found = estimate(plan, engine.workers, spare=engine.spare)
     engine = engine if found.workers else CallerEngine(engine.compute)
     with new_result(output, force=force) as result:
@@ -190,7 +197,8 @@ def _compute(
     progress(journal.done, journal.failed)
     for task, records, seconds, failure in engine.run(queue.next_task):
         if task is not None and records is not None and (wrong := unsound(journal.plan, records, task.size)):
-            records, failure = None, f"it returned {wrong}"
+            records = None
+            failure = f"it returned {wrong}"
         if records is None:
             ends.append(failure)
             if task is not None and not queue.retry(task):

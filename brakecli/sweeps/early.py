@@ -62,13 +62,15 @@ def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None
     acting = system.contact_stiffness, system.belt_speed, system.load_at_start
     modes = known.values, known.vectors
     try:
-        begin, seconds = system.initial.beside(known.rest), system.sampled_duration
+        begin = system.initial.beside(known.rest)
+        seconds = system.sampled_duration
         motion = Pursuit(system.coefficients, acting, begin, known.rest, modes, seconds)
     except np.linalg.LinAlgError:  # modes that are alike
         return None
     while (outcome := motion.seek()) == GOING_ON:
         pass
-    path, o = motion.path, motion.way
+    path = motion.path
+    o = motion.way
     if outcome == LINEAR:
         found = _linear(system, known, motion)
     else:
@@ -99,10 +101,13 @@ def _theory(system: System, theory: Theory | None) -> Linear | None:
 def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
     o = motion.way
-    start, end = (system.samples + 1) // 2 * system.interval, system.sampled_duration
+    start = (system.samples + 1) // 2 * system.interval
+    end = system.sampled_duration
     if o.time > start:
         return None
-    rest, values, vectors = np.array(o.rest), theory.values, theory.vectors
+    rest = np.array(o.rest)
+    values = theory.values
+    vectors = theory.vectors
     parts = np.linalg.solve(vectors, motion.state - rest)
 
     def at(time: float) -> Floats:
@@ -113,7 +118,8 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
     def amplitude(begin: float, until: float, *before: float) -> float:
         """Half of peak to peak of x between two times at which the motion is linear, and of what was before."""
         x = float(at(until)[0])
-        o.low, o.high = min(x, *before, x), max(x, *before, x)
+        o.low = min(x, *before, x)
+        o.high = max(x, *before, x)
         motion.swing(at(begin), until - begin)
         return 0.5 * float(o.high - o.low)
 
@@ -125,7 +131,8 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         answers = answers._replace(to_limit=theory.seconds_to_limit(end, last))
     decision = decide(answers, Thresholds())
     evidence = {"row": decision.row, "growth": theory.mode.growth}
-    numbers, left = (0.0, 0.0, force, system.radius * force), math.exp(theory.mode.growth * (end - o.time))
+    numbers = (0.0, 0.0, force, system.radius * force)
+    left = math.exp(theory.mode.growth * (end - o.time))
     kept: dict[str, Any] = {"evidence": evidence, "left": left}
     if decision.regime is not Regime.DAMPED:
         return Verdict(decision, amplitude(start, end), *numbers, start, False, **kept), last.tolist()
@@ -142,25 +149,36 @@ def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float
     """The least and the largest x (m) in the first seconds of a motion."""
     from brakecli.solver.flow.smooth import DONE, SmoothFlow
 
-    flow, state, least, most = SmoothFlow.of(system), system.initial.beside(theory.rest), math.inf, -math.inf
+    flow = SmoothFlow.of(system)
+    state = system.initial.beside(theory.rest)
+    least = math.inf
+    most = -math.inf
     while True:
         outcome = flow(state, seconds, tangents=False)
-        least, most = min(least, float(flow.path.low[0])), max(most, float(flow.path.high[0]))
+        least = min(least, float(flow.path.low[0]))
+        most = max(most, float(flow.path.high[0]))
         if outcome == DONE:
             return least, most
-        state, seconds = flow.state, seconds - float(flow.path.time)  # after many events it stops
+        # after many events it stops
+        state = flow.state
+        seconds = seconds - float(flow.path.time)
 
 
 def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
-    o, orbit, factor = motion.way, motion.orbit, motion.multiplier
-    end, period, interval = system.sampled_duration, orbit.period, system.interval
+    o = motion.way
+    orbit = motion.orbit
+    factor = motion.multiplier
+    end = system.sampled_duration
+    period = orbit.period
+    interval = system.interval
     if not factor < 1.0 or is_undamped(system.coefficients):  # without dashpots no orbit is sure to stay
         return None
     rate = -math.log(max(factor, 1e-300)) / period
     start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
     part = end - start
-    stick, clear = orbit.stick_fraction * period, orbit.contact_loss_fraction * period
+    stick = orbit.stick_fraction * period
+    clear = orbit.contact_loss_fraction * period
     limited = period - float(o.spent[o.sliding])
     hidden = (
         part < _SETTLED_PART * end

@@ -35,7 +35,8 @@ _PLACE = struct.Struct("<qqI")  # first unit, units, bytes of their records, whi
 _HEAD = struct.Struct("<qqII")  # the place, checksum of the place and the packed records
 _LEVEL = 1  # of packing: texts are alike, and numbers hardly smaller at the others
 _AT_ONCE = 1 << 14  # points read at a time
-_LONGEST_HEADER, _FIRST_KEY = 5_000_000, b"brakecli_version"
+_LONGEST_HEADER = 5_000_000
+_FIRST_KEY = b"brakecli_version"
 MOST_DIFFERENCES = 5
 
 
@@ -44,9 +45,13 @@ class Journal:
 
     def __init__(self, path: Path, file: FileIO, plan: Plan) -> None:
         """Begin without any records; `open_journal` reads those of the file."""
-        self.path, self.plan, self.kind = path, plan, record_type(plan)
+        self.path = path
+        self.plan = plan
+        self.kind = record_type(plan)
         self.finished = np.zeros(plan.units, dtype=bool)
-        self.done, self.failed = 0, 0  # points
+        # points
+        self.done = 0
+        self.failed = 0
         self._file = file
         self._unit_bytes = plan.unit_length * self.kind.itemsize
         # first unit, units, where their records begin and end, and their checksum
@@ -58,7 +63,8 @@ class Journal:
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units, which are sound."""
-        count, packed = len(records) // self._unit_bytes, zlib.compress(records, _LEVEL)
+        count = len(records) // self._unit_bytes
+        packed = zlib.compress(records, _LEVEL)
         place = first, count, len(packed)
         offset = self._file.seek(0, os.SEEK_END)
         try:
@@ -84,7 +90,8 @@ class Journal:
             return self._units(start, stop)
         inner = math.prod(plan.shape[plan.followed + 1 :])  # lines side by side, in as many units
         size = inner * plan.unit_length
-        first, last = start // size * inner, -(-stop // size) * inner
+        first = start // size * inner
+        last = -(-stop // size) * inner
         if self._slab is None or self._slab[:2] != (first, last):
             lines = self._units(first, last).reshape(-1, inner, plan.unit_length)
             self._slab = first, last, np.ascontiguousarray(lines.transpose(0, 2, 1)).ravel()
@@ -110,13 +117,15 @@ class Journal:
 
     def _units(self, first: int, last: int) -> NDArray[Any]:
         """The records of some units, in their order."""
-        length, kind = self.plan.unit_length, self.stored
+        length = self.plan.unit_length
+        kind = self.stored
         records = np.empty((last - first) * length, kind)
         for begin, count, *block in self._blocks[bisect_right(self._blocks, first, key=itemgetter(0)) - 1 :]:
             if begin >= last:
                 break
             data = self._unpacked(*block)
-            low, high = max(begin, first), min(begin + count, last)
+            low = max(begin, first)
+            high = min(begin + count, last)
             found = np.frombuffer(data, self.kind)[(low - begin) * length : (high - begin) * length]
             records[(low - first) * length : (high - first) * length] = found
         return records
@@ -138,7 +147,8 @@ class Journal:
 
     def begin(self, *, force: bool) -> None:
         """Take up what an earlier run has left, or write the header of a new journal."""
-        own, found = identity(self.plan), self._file.read(_LONGEST_HEADER)
+        own = identity(self.plan)
+        found = self._file.read(_LONGEST_HEADER)
         found = found[: found.find(b"\n") + 1] or found
         if not (refusal := _refusal(found, own)):
             self._read_blocks(len(found))

@@ -95,7 +95,8 @@ def _points(rows: Iterator[Row], name: str) -> Listed:
         if path in paths:
             raise _wrong(f"{key} has two columns", "keep one of them", name, line)
         paths[path] = key
-    columns, lines = [list[Any]() for _ in keys], list[int]()
+    columns = [list[Any]() for _ in keys]
+    lines = list[int]()
     for line, cells in rows:
         if len(cells) != len(keys) or "" in cells:
             has = f"has {entries(tuple(cells))} for {len(keys)} keys"

@@ -58,7 +58,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
         except CaseError as error:
             raise CaseError([replace(each, source=option) for each in error.problems]) from None
 
-    values, reports = [axis.value(place) for place in range(axis.size)], []
+    values = [axis.value(place) for place in range(axis.size)]
+    reports = []
     for value in (values[0], values[-1]):  # so that a wrong end is known before anything is computed
         system_at(value)
     for place, value in enumerate(values):
@@ -76,7 +77,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
     turning = [(value, report.stable is True) for value, report in turned]
     for (low, before), (high, after) in pairwise(turning):
         if before != after:
-            ends, at_low = sorted((low, high)), before if low < high else after
+            ends = sorted((low, high))
+            at_low = before if low < high else after
 
             def as_below(value: float, at_low: bool = at_low) -> bool:
                 progress("critical values", len(critical), len(critical) + 1)
@@ -94,7 +96,8 @@ def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None
             file.write(_csv(found).encode())
             file.publish()
         return
-    axis, names = found.axis, found.parameters
+    axis = found.axis
+    names = found.parameters
     with new_result(path, force=force) as result:
         result.set_attributes(origin("stability", loaded.case.title, loaded))
         result.set_fields(fields.LOCK_IN, values_of(fields.LOCK_IN, found))

@@ -23,7 +23,10 @@ from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined
 
 VALUES = 33  # of the parameter, between which a change is looked for
 EDGES = 4  # halvings towards the ends of a range in which the answer is not known
-BATCHES, BATCH, TRANSIENT = 8, 4, 16  # batches of a long run, segments of a batch, segments before the first
+# batches of a long run, segments of a batch, segments before the first
+BATCHES = 8
+BATCH = 4
+TRANSIENT = 16
 FEWEST = 4  # batches without which an error is not known
 DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a motion
 CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
@@ -62,12 +65,17 @@ def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Expon
     that part is left out. None where too little is left. The maps of a `linear` motion hardly change: there the
     eigenvalues of their product count, which do not swing as lengths of disturbances do.
     """
-    flow, span = RoughFlow(system, default_cells(system)), length(system)
+    flow = RoughFlow(system, default_cells(system))
+    span = length(system)
     steps = default_steps(system, span)
     begin = np.array([rest.x, rest.y, 0.0, 0.0])
     fast = 2.0 * math.pi * system.natural_frequencies[1]
     scales = np.array([1.0, 1.0, fast, fast])
-    state, frame, logs, away, maps = begin, np.eye(4), list[float](), list[float](), list[Floats]()
+    state = begin
+    frame = np.eye(4)
+    logs = list[float]()
+    away = list[float]()
+    maps = list[Floats]()
     for k in range(TRANSIENT + BATCHES * BATCH):
         run = flow(state, k * span, span, steps, True)
         if run.status is not Status.DONE or run.derivative is None:
@@ -112,7 +120,8 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
         return measured.unstable if measured else None
 
     def edge(low: float, high: float) -> Edge:
-        below, tolerance = unstable(low), critical.tolerance
+        below = unstable(low)
+        tolerance = critical.tolerance
 
         def as_below(value: float) -> bool | None:
             return None if (answer := unstable(value)) is None else answer is below

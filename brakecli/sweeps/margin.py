@@ -13,7 +13,8 @@ from brakecli.sweeps.plan import Plan
 
 MOST_POINTS = 10**5
 """Points of a sweep whose settings are listed to find these cases; a choice."""
-MOST, MOST_ROUGH = 2500, 64
+MOST = 2500
+MOST_ROUGH = 64
 """Cases whose critical friction is looked for, smooth and rough ones; a sweep that needs more gets no line."""
 _FRICTION = ("friction", "coefficient")
 

@@ -33,7 +33,9 @@ START_SECONDS = 0.7  # of the command, until it loads kernels, and to end
 WORKER_SECONDS = 1.3  # that its workers take to start, until they load kernels
 MOST_LOADING = 1.5  # s, which both take to load kernels: what takes longer has compiled them, and stays
 LONGEST = 0.3  # guessed time (s) of a point beyond which its run is only begun
-FEWEST, MOST = 3, 32  # places
+# places
+FEWEST = 3
+MOST = 32
 _ROUNDS = 60  # after which an iteration that at least halves its error has come to rounding
 DRAWN = 0.25  # of the points, at most
 LOADING = 2  # neighbours that load the kernels of lanes
@@ -78,7 +80,8 @@ class Pilot:
 
     def look(self) -> None:
         """Draw places and compute their points until that has taken its time."""
-        plan, spent = self.plan, 0.0
+        plan = self.plan
+        spent = 0.0
         shape = plan.shape or (1,) if plan.followed is None else (plan.units, plan.unit_length)
         enough = max(1.0, DRAWN * math.prod(shape))
         for place in itertools.islice(drawn(shape), MOST):
@@ -90,7 +93,8 @@ class Pilot:
             begin = process_time()
             seconds = self._place(shape, place)
             if seconds > UNEVEN * max(self.times, default=math.inf):  # kernels may have been loaded there
-                looked_at, begin = len(self.points), process_time()
+                looked_at = len(self.points)
+                begin = process_time()
                 again = self._place(shape, place)
                 self.loading += min(max(seconds - again, 0.0), MOST_LOADING)
                 seconds = min(seconds, again)
@@ -119,9 +123,12 @@ class Pilot:
 
         As many as a task holds share loops of lanes, which take as long where lanes are empty.
         """
-        task, begin = max(1, min(TOGETHER, self.plan.units // self.workers)), process_time()
+        task = max(1, min(TOGETHER, self.plan.units // self.workers))
+        begin = process_time()
         middle = begun(self.plan, self.plan.settings(at))
-        in_lanes, task_loops, others = isinstance(middle, Begun) and loops([middle.check.system]), 0, list[Begun]()
+        in_lanes = isinstance(middle, Begun) and loops([middle.check.system])
+        task_loops = 0
+        others = list[Begun]()
         if in_lanes:
             self.together = task
             others = self._begun(at, task)
@@ -137,7 +144,8 @@ class Pilot:
         with within_range():
             certified = certify_together(systems, may_suffice)
         climbed = (process_time() - begin) / max(loops(systems), 1) * task_loops / max(len(others), 1)
-        begin, alone = process_time(), list[Begun]()
+        begin = process_time()
+        alone = list[Begun]()
         with within_range():
             known = judged_together(systems, certified)
         for each, (found, theory) in zip(ready, known, strict=True):
@@ -147,7 +155,8 @@ class Pilot:
                 self._point(each, found, theory)
         seconds = process_time() - begin
         if in_lanes:
-            self.in_lanes, self.alone = self.in_lanes + len(ready), self.alone + len(alone)
+            self.in_lanes = self.in_lanes + len(ready)
+            self.alone = self.alone + len(alone)
         if alone:
             seconds += len(alone) * self._alone(alone[len(alone) // 2])
         return prepared + climbed + seconds / size
@@ -164,7 +173,8 @@ class Pilot:
 
     def _line(self, unit: int, at: int) -> float:
         """Processor time (s) of a point that is followed along a line, from some place of it on."""
-        plan, size = self.plan, self.plan.unit_length
+        plan = self.plan
+        size = self.plan.unit_length
         inner = math.prod(plan.shape[(plan.followed or 0) + 1 :])
         outer, rest = divmod(unit % (plan.points // size), inner)
         first = max(0, min(at, size - FOLLOWED))

@@ -47,8 +47,12 @@ class Plan:
         listed: Listed | None = None,
     ) -> None:
         """Read the sweep and the keys of its case."""
-        self.sweep_text, self.case_text, self.records, self.listed = sweep_text, case_text, records, listed
-        self.sweep, self.case_keys = parse_table(Sweep, sweep_text, "the sweep"), parse(case_text, "the case")
+        self.sweep_text = sweep_text
+        self.case_text = case_text
+        self.records = records
+        self.listed = listed
+        self.sweep = parse_table(Sweep, sweep_text, "the sweep")
+        self.case_keys = parse(case_text, "the case")
         axes = self.sweep.axis
         self.shape = tuple(axis.size for axis in axes) if listed is None else (listed.size,)
         self.points = math.prod(self.shape)  # of the grid
@@ -184,7 +188,8 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
 
 def sweep_of(tables: dict[str, Any], base: LoadedCase, listed: Listed | None = None) -> LoadedSweep:
     """The sweep of the tables that its file would have, over a case at hand. Raises `CaseError`."""
-    text, name = tomli_w.dumps(tables), "the sweep"
+    text = tomli_w.dumps(tables)
+    name = "the sweep"
     try:
         return _checked(parse_table(Sweep, text, name), text, name, base, listed)
     except CaseError as error:  # lines of that text would help nobody

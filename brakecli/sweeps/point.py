@@ -65,7 +65,8 @@ def followed(plan: Plan, points: Sequence[int]) -> Iterator[NDArray[Any]]:
 
     The wheel goes on turning: its waves keep the phases that they have come to.
     """
-    start, outcome = Settings(), None
+    start = Settings()
+    outcome = None
     for point in points:
         if outcome is not None and not outcome.motion.work.failed:
             start = next_start(outcome)
@@ -80,7 +81,8 @@ def line_points(plan: Plan, line: int) -> list[int]:
     """
     if plan.followed is None:
         return [line]
-    followed, inner = plan.sweep.axis[plan.followed], math.prod(plan.shape[plan.followed + 1 :])
+    followed = plan.sweep.axis[plan.followed]
+    inner = math.prod(plan.shape[plan.followed + 1 :])
     lines = plan.points // followed.size
     outer, rest = divmod(line % lines, inner)
     down = followed.direction == "down" or (followed.direction == "both" and line >= lines)
@@ -93,7 +95,9 @@ def next_start(outcome: PointRun) -> Settings:
 
     Its waves go on with the phases that they have come to, also where the next case has other wavelengths.
     """
-    system, wheel, state = outcome.motion.system, outcome.case.roughness.wheel, outcome.motion.rows[-1, :4]
+    system = outcome.motion.system
+    wheel = outcome.case.roughness.wheel
+    state = outcome.motion.rows[-1, :4]
     end = initial_at(outcome.case, system, system.sampled_duration, state.tolist())
     start: Settings = {("initial",): end}
     if wheel is not None:

@@ -86,7 +86,8 @@ def without_dashpots(critical: Critical, answers: Answers) -> Search:
 
     No branch leads through a resonance then, and a large motion beside may hide what full contact does.
     """
-    known, line = pieces(answers), answers.line
+    known = pieces(answers)
+    line = answers.line
 
     @cache
     def unstable(value: float) -> bool | None:
@@ -115,7 +116,8 @@ def calm(answers: Answers, value: float) -> list[Array]:
 
 def pieces(answers: Answers) -> list[Piece]:
     """The range in parts: stable, unstable, or not known. Where nothing slides steadily it counts as unstable."""
-    found, last = list[tuple[float, float, bool | None]](), 0.0
+    found = list[tuple[float, float, bool | None]]()
+    last = 0.0
     slides = [slide.p for slide in answers.explored.slides if not math.isnan(slide.tests[0])]
     ends = (slides[0], slides[-1]) if slides else (1.0, 0.0)
     spans = [(low.p, high.p, True) for low, high in answers.windows]

@@ -34,7 +34,8 @@ def record_type(plan: Plan) -> np.dtype[Any]:
 
 def unsound(plan: Plan, records: bytes, units: int) -> str:
     """Why these are not the records of so many units, wherever they come from; empty where they are."""
-    kind, size = record_type(plan), len(records)
+    kind = record_type(plan)
+    size = len(records)
     if size != units * plan.unit_length * kind.itemsize:
         return f"{size} bytes in place of {units * plan.unit_length} records of {kind.itemsize}"
     found = np.frombuffer(records, kind)

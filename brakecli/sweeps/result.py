@@ -43,18 +43,24 @@ class Findings:
     def __init__(self, journal: Journal) -> None:
         """Look through the variables of a sweep."""
         plan = journal.plan
-        self.points, self.dimensions = plan.passes * plan.points, tuple(plan.dimensions)
-        self.failed, self.warned, self.first_warning = 0, 0, ""
+        self.points = plan.passes * plan.points
+        self.dimensions = tuple(plan.dimensions)
+        self.failed = 0
+        self.warned = 0
+        self.first_warning = ""
         self.failures: list[dict[str, Any]] = []
         regimes = Counter[bytes]()
         for start, records in journal.blocks():
-            failed, warned = np.flatnonzero(records["status"] != _DONE), np.flatnonzero(records["warning_count"])
+            failed = np.flatnonzero(records["status"] != _DONE)
+            warned = np.flatnonzero(records["warning_count"])
             for place in failed[: MOST_FAILURES - len(self.failures)].tolist():
-                point, reason = start + place, records["reason"][place].decode()
+                point = start + place
+                reason = records["reason"][place].decode()
                 self.failures.append({"point": point, "parameters": _parameters(plan, point), "reason": reason})
             if len(warned) and not self.warned:
                 self.first_warning = records["warning"][warned[0]].decode()
-            self.failed, self.warned = self.failed + len(failed), self.warned + len(warned)
+            self.failed = self.failed + len(failed)
+            self.warned = self.warned + len(warned)
             names, counts = np.unique(records["regime"], return_counts=True)
             regimes.update(dict(zip(names.tolist(), counts.tolist(), strict=True)))
         self.regimes = {name.decode(): count for name, count in sorted(regimes.items())}
@@ -70,7 +76,8 @@ class Findings:
         self.attractors: list[Attractor] | None = None
         if plan.over_starts:
             come_to = Attractors.of(journal)
-            self.come_to, self.attractors = come_to.numbers, come_to.found
+            self.come_to = come_to.numbers
+            self.attractors = come_to.found
             self.sentences += come_to.sentences
         self.variables: dict[str, Any] | None = None
         if self.points <= MOST_AS_JSON:
@@ -110,7 +117,9 @@ class SweepReport:
 
 def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     """Everything that the file holds."""
-    loaded, found, plan = report.loaded, report.findings, journal.plan
+    loaded = report.loaded
+    found = report.findings
+    plan = journal.plan
     sweep = {"sweep_toml": loaded.text, "resolved_sweep_toml": loaded.resolved}
     result.set_attributes({**origin("sweep", loaded.title, loaded.base), **sweep})
     result.set_fields(fields.SWEEP, report.numbers())
@@ -119,20 +128,25 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     for axis in plan.sweep.axis:
         _write_along(result, axis.name, axis.parameter, axis.name, _values(axis))
     if plan.listed is not None:
-        keys, point = plan.listed.keys, fields.LISTED_POINT
+        keys = plan.listed.keys
+        point = fields.LISTED_POINT
         result.variable("/", point, (point.name,), np.arange(plan.points), parameters=[*keys])
         for key, column in zip(keys, plan.listed.columns, strict=True):
             _write_along(result, key.replace(".", "_"), [key], point.name, column)
     elif not plan.sweep.axis:
         result.axis("/", fields.BASE_POINT, np.zeros(1))
-    windows, critical = 0, plan.sweep.critical
+    windows = 0
+    critical = plan.sweep.critical
     if critical is not None:
         windows = journal.column("critical_windows_lower").shape[-1]
         result.axis("/", fields.WINDOW, np.arange(float(windows)))
     for field in plan.fields:
-        attributes, kind, dimensions = {}, journal.stored[field.name], found.dimensions
+        attributes = {}
+        kind = journal.stored[field.name]
+        dimensions = found.dimensions
         if critical is not None and field in fields.CRITICAL and "f8" in field.kind and not field.units:
-            attributes, field = {"parameter": critical.parameter}, replace(field, units=unit(critical.parameter))
+            attributes = {"parameter": critical.parameter}
+            field = replace(field, units=unit(critical.parameter))
         if kind.shape:
             dimensions = (*dimensions, fields.WINDOW.name)
         result.begin_column(field, dimensions, kind, **attributes)
@@ -158,7 +172,8 @@ def _write_along(
     result: ResultFile, name: str, keys: Sequence[str], dimension: str, values: Sequence[Any]
 ) -> None:
     """The values that keys take along a dimension."""
-    about, given = key_schema(Case, key_path(keys[0])), {*map(type, values)}
+    about = key_schema(Case, key_path(keys[0]))
+    given = {*map(type, values)}
     number = "i8" if given == {int} and about.get("type") == "integer" else "f8"
     numeric = all(type(each) in (int, float) and math.isfinite(each) for each in values)
     data = np.array(values, number) if numeric else np.array([*map(label, values)])
@@ -180,14 +195,19 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
     """Where the motions on the way up and on the way down differ (1), and what to say of it; None without both."""
     if journal.plan.passes != 2:
         return None, []
-    regime, amplitude = journal.column("regime"), journal.column("amplitude")
+    regime = journal.column("regime")
+    amplitude = journal.column("amplitude")
     done = (journal.column("status") == _DONE) & (regime != b"undecided")
-    lasting, other = (regime != b"damped").any(axis=0), regime[0] != regime[1]
+    lasting = (regime != b"damped").any(axis=0)
+    other = regime[0] != regime[1]
     apart = np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0)  # not where one is missing
     on_its_way = ~other & apart & lasting & (journal.column("settled") == 0).any(axis=0)
     known = done.all(axis=0) & ~on_its_way
     differ = known & (other | (apart & lasting))
-    count, size, decided, said = int(differ.sum()), differ.size, int(known.sum()), list[str]()
+    count = int(differ.sum())
+    size = differ.size
+    decided = int(known.sum())
+    said = list[str]()
     lasts = regime != b"damped"
     simple = done.all() and differ.ndim == 1 and (differ == (lasts[0] != lasts[1])).all()
     if count and simple and (ends := _ends_of_loop(journal.plan, lasts)):
@@ -217,7 +237,8 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
 def _on_undecided(journal: Journal) -> Iterator[str]:
     """Where a quarter of the points or more are undecided: the most frequent reason, and what to do."""
     undecided = (journal.column("regime") == b"undecided") & (journal.column("status") == _DONE)
-    count, size = int(undecided.sum()), undecided.size
+    count = int(undecided.sum())
+    size = undecided.size
     if journal.plan.sweep.critical is not None or 4 * count < size or not count:
         return
     alike: dict[str, list[str]] = {}
@@ -232,12 +253,14 @@ def _on_undecided(journal: Journal) -> Iterator[str]:
 
 def _on_settled(journal: Journal) -> Iterator[str]:
     """How many points that run as long as they need have settled, and how long they ran."""
-    plan, size = journal.plan, journal.column("status").size
+    plan = journal.plan
+    size = journal.column("status").size
     if plan.sweep.critical is not None or ("solver", "duration") in plan.settings(0):
         return
     if plan.case({}).solver.duration != SETTLED:
         return
-    done, seconds = journal.column("status") == _DONE, journal.column("duration")
+    done = journal.column("status") == _DONE
+    seconds = journal.column("duration")
     lasts = journal.column("excitation") != b"none"
     settled = done & (journal.column("regime") != b"undecided") & (~lasts | (journal.column("settled") == 1))
 
@@ -255,7 +278,8 @@ def _on_settled(journal: Journal) -> Iterator[str]:
 def _ends_of_loop(plan: Plan, lasts: NDArray[Any]) -> str:
     """Between which values vibration begins and ends on both ways, (2, points); empty if not once on each."""
     (axis,) = plan.sweep.axis
-    values, said = np.array(_values(axis)), list[str]()
+    values = np.array(_values(axis))
+    said = list[str]()
     for way, row, order in (("up", lasts[0], np.argsort(values)), ("down", lasts[1], np.argsort(-values))):
         changes = np.flatnonzero(np.diff(row[order]))
         if len(changes) != 1:
@@ -284,7 +308,8 @@ def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
 
 def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]:
     """What is to be done where no critical value is known, or hardly one, and where windows are hardly known."""
-    wide, size = WIDE * (upper - lower), journal.column("status").size
+    wide = WIDE * (upper - lower)
+    size = journal.column("status").size
     undecided = int((journal.column("critical_status") == b"undecided").sum())
     unsure = int((np.nan_to_num(journal.column("critical_error"), nan=0.0) > wide).sum())
     wheel = "or waves of the wheel that have a common period"
@@ -299,7 +324,8 @@ def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]
         values, errors = (journal.column(f"critical_windows_{end}{of}") for of in ("", "_error"))
         vague = np.nan_to_num(errors, nan=0.0) > wide
         if vague.any():
-            low, high = max(lower, (values - errors)[vague].min()), min(upper, (values + errors)[vague].max())
+            low = max(lower, (values - errors)[vague].min())
+            high = min(upper, (values + errors)[vague].max())
             what = f"a window of instability {'begins' if end == 'lower' else 'ends'} anywhere"
             where = f"from {low:.5g} to {high:.5g}: no motion was found there, or its growth is not certain"
             yield f"at {int(vague.any(axis=-1).sum())} of {size} points {what} {where}"

@@ -38,13 +38,15 @@ def on_short_runs(journal: Journal) -> Iterator[str]:
     if plan.followed is None or not plan.sweep.axis[plan.followed].numeric:
         return
     undecided = (journal.column("regime") == b"undecided") & (journal.column("status") == b"done")
-    amplitudes, growing = journal.column("amplitude").ravel(), list[tuple[float, float]]()
+    amplitudes = journal.column("amplitude").ravel()
+    growing = list[tuple[float, float]]()
     for index in np.flatnonzero(undecided.ravel())[:MOST].tolist():
         point = index % plan.points
         found = _theory(plan, point)
         if found is None:
             continue
-        theory, rate = found, found.mode.growth
+        theory = found
+        rate = found.mode.growth
         value = plan.sweep.axis[plan.followed].value(plan.places(point)[plan.followed])
         if rate > 0.0 and amplitudes[index] < _reach(theory):
             before = _theory(plan, _before(plan, point, down=index >= plan.points))
@@ -71,7 +73,8 @@ def _theory(plan: Plan, point: int) -> Linear | None:
 def _before(plan: Plan, point: int, *, down: bool) -> int:
     """The point from which a point is reached; of the first point of a line, the second."""
     assert plan.followed is not None
-    axis, place = plan.sweep.axis[plan.followed], plan.places(point)[plan.followed]
+    axis = plan.sweep.axis[plan.followed]
+    place = plan.places(point)[plan.followed]
     order = sorted(range(axis.size), key=axis.value, reverse=down)
     k = order.index(place)
     other = order[k - 1] if k else order[min(1, axis.size - 1)]

@@ -75,12 +75,14 @@ def judged(
         ended = settled(found.system, run)
     verdict, motion, certificate = ended.judged
     notes = [note for about, note in verdict.notes.items() if about not in _UNTOLD]
-    warnings, work = [*found.warnings, *ended.warnings, *notes], motion.work
+    warnings = [*found.warnings, *ended.warnings, *notes]
+    work = motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
     if certificate is not None and not certificate.certified:
         warnings.append(f"solver.tolerance: {certificate.sentence()}")
-    status, reason = Status.FAILED if work.failed else Status.DONE, "; ".join(verdict.reasons)
+    status = Status.FAILED if work.failed else Status.DONE
+    reason = "; ".join(verdict.reasons)
     first = next(iter(warnings), "")
     return PointRun(verdict, case, motion, certificate, status, reason, first, len(warnings))
 

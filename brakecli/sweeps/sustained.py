@@ -55,7 +55,8 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
     that a rough wheel forces and that are no vibrations.
     """
     line = answers.line
-    low, high = line.low, line.high
+    low = line.low
+    high = line.high
 
     @cache
     def end(value: float) -> End:
@@ -69,11 +70,13 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
         seen.add(value)
         return end(value).lasts
 
-    seen, just_below = set[float](), math.nan
+    seen = set[float]()
+    just_below = math.nan
     if found.outcome is Outcome.FOUND:
         # the bracket of a loss of stability may be far narrower than is asked here, and runs there take long
         just_below = low = max(low, found.lower - 0.5 * tolerance)
-        high, stride = min(high, found.upper), tolerance
+        high = min(high, found.upper)
+        stride = tolerance
         while lasts(low) is not False and low > line.low:
             low, high = max(line.low, low - stride), low if lasts(low) else high
             stride *= GALLOP
@@ -123,7 +126,9 @@ def _by_runs(case: Case, system: System) -> End:
     """
     theory = linear_theory(system, system.belt_speed)
     linear = theory is not None and not theory.opens
-    regime, amplitude = Regime.UNDECIDED, math.inf  # of the run before
+    # of the run before
+    regime = Regime.UNDECIDED
+    amplitude = math.inf
     for times in DURATIONS:
         verdict = verdict_of(changed(case, solver={"duration": times * system.duration}))
         if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
@@ -134,5 +139,6 @@ def _by_runs(case: Case, system: System) -> End:
         known = verdict.regime is regime is not Regime.UNDECIDED
         if known and abs(amplitude - verdict.amplitude) <= SAME * verdict.amplitude:
             return LASTS
-        regime, amplitude = verdict.regime, verdict.amplitude
+        regime = verdict.regime
+        amplitude = verdict.amplitude
     return UNKNOWN

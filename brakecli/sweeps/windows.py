@@ -89,7 +89,9 @@ def joined(critical: Critical, pieces: list[Piece], edge: Callable[[float, float
     decided = [k for k, piece in enumerate(pieces) if piece.unstable is not None]
     if not decided:
         return Search(Outcome.UNDECIDED)
-    first, last, edges = pieces[decided[0]], pieces[decided[-1]], list[Edge]()
+    first = pieces[decided[0]]
+    last = pieces[decided[-1]]
+    edges = list[Edge]()
     begun = first.unstable and decided[0] == 0
     if decided[0] > 0:
         edges += [
@@ -97,7 +99,8 @@ def joined(critical: Critical, pieces: list[Piece], edge: Callable[[float, float
             *[_anywhere(first.low, critical.lower)] * (not first.unstable),
         ]
     for one, other in pairwise(decided):
-        before, after = pieces[one], pieces[other]
+        before = pieces[one]
+        after = pieces[other]
         if before.unstable is not after.unstable:
             edges.append(edge(before.high, after.low))
         elif not before.unstable and other > one + 1:
@@ -129,5 +132,6 @@ def of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
     if first.error >= wide:  # almost any value of the range may be it
         return Search(Outcome.UNDECIDED)
     outcome = Outcome.REGAINED if unstable and len(edges) == 1 else Outcome.FOUND
-    lower, upper = max(first.value - first.error, critical.lower), min(first.value + first.error, critical.upper)
+    lower = max(first.value - first.error, critical.lower)
+    upper = min(first.value + first.error, critical.upper)
     return Search(outcome, first.value, lower, upper, first.error, windows=windows, window_errors=errors)

@@ -19,7 +19,8 @@ from brakecli.solver.quantities import HISTORY
 from tests.analysis.shoes import Array, Shoe, Tables
 
 X, Y, VX, VY, FRICTION, NORMAL, FRACTION, STATE = range(len(HISTORY))
-STICK, SEPARATED = 0.0, 2.0
+STICK = 0.0
+SEPARATED = 2.0
 LONGER = 8
 EIGHTHS = 8
 FALLS = "longer run: vx"
@@ -60,8 +61,10 @@ def last_eighth(rows: Array) -> Array:
 
 def sticks_per_cycle(rows: Array) -> float:
     """Sticks that begin, over rises of vx through its mean."""
-    v, stick = rows[:, VX] - rows[:, VX].mean(), rows[:, STATE] == STICK
-    high, low = v > 0.3 * v.std(), v < -0.3 * v.std()
+    v = rows[:, VX] - rows[:, VX].mean()
+    stick = rows[:, STATE] == STICK
+    high = v > 0.3 * v.std()
+    low = v < -0.3 * v.std()
     marks = np.where(high, 1, np.where(low, -1, 0))
     marks = marks[marks != 0]
     rises = int(np.count_nonzero(np.diff(marks) > 0))
@@ -105,7 +108,8 @@ def opened_answer(tables: Tables, shoe: Shoe) -> Answer:
 def linear_answer(tables: Tables, shoe: Shoe, how: str) -> Answer:
     """What the sign of the slowest mode says, where the slopes of the surfaces cannot change it."""
     shaken = "wheel" in tables.get("roughness", {})
-    rate, steep = shoe.rate, slope(tables) * 2.0 * math.pi * shoe.fast if shaken else 0.0
+    rate = shoe.rate
+    steep = slope(tables) * 2.0 * math.pi * shoe.fast if shaken else 0.0
     how = f"{how}: {rate:.4g} 1/s"
     if steep > abs(rate):
         measured, change = measured_rate(tables)
@@ -124,16 +128,20 @@ def linear_answer(tables: Tables, shoe: Shoe, how: str) -> Answer:
 
 def slope(tables: Tables) -> float:
     """Largest slope of the wheel's surface as the whole pad feels it: the force changes by 2ak of it with x."""
-    waves, half = tables["roughness"]["wheel"], tables["contact"]["half_length"]
+    waves = tables["roughness"]["wheel"]
+    half = tables["contact"]["half_length"]
     turns = 2.0 * math.pi / np.array(waves["wavelengths"])
     return float(np.sum(np.abs(waves["amplitudes"] * turns * np.sinc(turns * half / math.pi))))
 
 
 def measured_rate(tables: Tables) -> tuple[float, float]:
     """Growth rate (1/s) of the difference of two neighbouring runs, and the power of e by which it has changed."""
-    shoe, initial = Shoe.of(tables), tables["initial"]
-    speed, size = initial.get("vx", 0.0), 2.0 * math.pi * shoe.fast * abs(float(shoe.rest[1]))
-    one, other = history(tables, LONGER), history(with_start(tables, vx=speed + 1e-5 * size), LONGER)
+    shoe = Shoe.of(tables)
+    initial = tables["initial"]
+    speed = initial.get("vx", 0.0)
+    size = 2.0 * math.pi * shoe.fast * abs(float(shoe.rest[1]))
+    one = history(tables, LONGER)
+    other = history(with_start(tables, vx=speed + 1e-5 * size), LONGER)
     if one is None or other is None:
         return 0.0, 0.0
     apart = levels(one - other)
@@ -146,7 +154,8 @@ def measured_rate(tables: Tables) -> tuple[float, float]:
 
 def late_answer(shoe: Shoe, long: Array) -> Answer:
     """What the end of a long run on a smooth wheel shows: whether a motion is left, and whether it lasts."""
-    last, level = last_eighth(long), levels(long)
+    last = last_eighth(long)
+    level = levels(long)
     if left := at_rest(shoe, long):
         return left
     if linear(last, shoe):
@@ -166,7 +175,8 @@ def late_answer(shoe: Shoe, long: Array) -> Answer:
 
 def at_rest(shoe: Shoe, long: Array) -> Answer | None:
     """The answer where no motion is left at the end of a long run."""
-    last, level = last_eighth(long), levels(long)
+    last = last_eighth(long)
+    level = levels(long)
     if (last[:, STATE] == SEPARATED).all():
         return Answer("gone", "no contact at the end of the longer run")
     if (last[:, STATE] == STICK).all():
@@ -195,7 +205,8 @@ def shaken_answer(tables: Tables, shoe: Shoe, long: Array) -> Answer:
         f"without roughness {flat}; two starts end {apart:.1g} apart; {times:.2g} times the level at low friction"
     )
     how += f"; friction gives {by_friction:.2g} W and roughness {by_roughness:.2g} W ± {open_account:.2g}"
-    stable, damped = flat in ("dies", "neutral"), bool(shoe.b.any())
+    stable = flat in ("dies", "neutral")
+    damped = bool(shoe.b.any())
     if damped and (stable or times < 2.0) and by_friction < -2.0 * open_account:  # friction only takes
         return Answer("forced", how, sticks)
     if stable and (apart < 1e-3 or by_roughness > 2.0 * max(by_friction, 0.0) + 2.0 * open_account):
@@ -214,7 +225,8 @@ def flat_answer(tables: Tables) -> Answer:
 
     What only falls, even to a third, may fall to a limit cycle.
     """
-    flat, shoe = without_roughness(tables), Shoe.of(tables)
+    flat = without_roughness(tables)
+    shoe = Shoe.of(tables)
     found = Answer("no answer", "")
     for times in (LONGER, LONGER**2):
         rows = history(flat, times)

@@ -24,7 +24,8 @@ def _shoe(
     """The tables of a case. Waves: amplitude, wavelength, phase; `time`: step, duration, sample interval."""
 
     def rough(terms: list[Numbers]) -> dict[str, list[float]]:
-        names, padded = ("amplitudes", "wavelengths", "phases_deg"), [(*term, 0.0)[:3] for term in terms]
+        names = ("amplitudes", "wavelengths", "phases_deg")
+        padded = [(*term, 0.0)[:3] for term in terms]
         return {name: list(values) for name, values in zip(names, zip(*padded, strict=True), strict=True)}
 
     links = [dict(zip(("stiffness", "damping", "angle_deg"), link, strict=True)) for link in (one, two)]

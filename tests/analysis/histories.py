@@ -48,14 +48,17 @@ def events_from_samples(time: Array, x: Array, vx: Array, state: Array) -> Event
     interval = float(time[1] - time[0]) if len(time) > 1 else INTERVAL
     ways = np.sign(vx)
     moving = np.flatnonzero(ways)
-    before, after = moving[:-1], moving[1:]
+    before = moving[:-1]
+    after = moving[1:]
     turning = ways[before] * ways[after] < 0.0
     before, after, way = before[turning], after[turning], ways[before[turning]]
     middle = np.clip(np.where(way * x[before] >= way * x[after], before, after), 1, len(x) - 2)
-    rise, bend = x[middle + 1] - x[middle - 1], x[middle - 1] - 2.0 * x[middle] + x[middle + 1]
+    rise = x[middle + 1] - x[middle - 1]
+    bend = x[middle - 1] - 2.0 * x[middle] + x[middle + 1]
     part = np.clip(-0.5 * rise / np.where(bend == 0.0, np.inf, bend), -1.0, 1.0)
     found = [(time[middle] + part * interval, np.where(way > 0.0, MAX, MIN), x[middle] + 0.25 * part * rise)]
-    was, now = state[:-1], state[1:]
+    was = state[:-1]
+    now = state[1:]
     for kind, of, begins in (
         (STICK, ContactState.STICK, True),
         (SLIP, ContactState.STICK, False),

@@ -53,7 +53,8 @@ def motions(per_cycle: int, cycles: int) -> Iterator[Motion]:
         for slip in (0.02, 0.1, 0.3):
             irregular = stick_slip(per_cycle, cycles, slip, sizes)
             yield Motion(f"irregular stick-slip {sizes} {slip}", Regime.RELAXATION, irregular)
-    sine, other = np.sin(phase), np.sin(1.37 * phase + 1.0)
+    sine = np.sin(phase)
+    other = np.sin(1.37 * phase + 1.0)
     yield Motion("harmonic", Regime.QUASI_HARMONIC, sine)
     yield Motion("amplitude modulated", Regime.QUASI_HARMONIC, (1.0 + 0.9 * np.sin(phase / 11.0)) * sine)
     yield Motion("frequency modulated", Regime.QUASI_HARMONIC, np.sin(phase + 1.5 * np.sin(phase / 20.0)))

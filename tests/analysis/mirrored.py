@@ -42,9 +42,13 @@ def rough_shoe(seed: int) -> Tables:
         return float(10.0 ** rng.uniform(math.log10(low), math.log10(high)))
 
     while True:
-        mass, one, two = between(0.1, 50.0), between(3e5, 3e7), between(3e5, 3e7)
-        rate, angle = math.sqrt(one / mass), float(rng.uniform(-30.0, 30.0))
-        contact, load = between(0.25, 15.0) * (one + two), between(50.0, 5000.0)
+        mass = between(0.1, 50.0)
+        one = between(3e5, 3e7)
+        two = between(3e5, 3e7)
+        rate = math.sqrt(one / mass)
+        angle = float(rng.uniform(-30.0, 30.0))
+        contact = between(0.25, 15.0) * (one + two)
+        load = between(50.0, 5000.0)
         speed = between(0.02, 3.0) * load / contact * rate * float(rng.choice([-1.0, 1.0]))
         count = int(rng.integers(1, 4))
         waves = [2.0 * math.pi * abs(speed) / (rate * between(0.1, 6.0)) for _ in range(count)]

@@ -82,7 +82,8 @@ def shaking(tables: Tables, rows: Array) -> float:
 
 def own_share(tables: Tables, rows: Array) -> float:
     """Part of vx in the second half that the frequencies of the waves and the sums of two of them do not hold."""
-    belt, part = Shoe.of(tables).belt, rows[len(rows) // 2 :]
+    belt = Shoe.of(tables).belt
+    part = rows[len(rows) // 2 :]
     passing = [abs(belt) / length for length in tables["roughness"]["wheel"]["wavelengths"]]
     lines = {*passing, *(abs(f + s * g) for f in passing for g in passing for s in (-1.0, 1.0))}
     time = 2.0 * math.pi * tables["output"]["sample_interval"] * np.arange(len(part))

@@ -28,13 +28,15 @@ class Shoe:
     @classmethod
     def of(cls, tables: Tables) -> "Shoe":
         """Build the matrices of the page on the model."""
-        one, two, wheel = tables["link1"], tables["link2"], tables["wheel"]
-        beta, alpha = math.radians(one.get("angle_deg", 0.0)), math.radians(two.get("angle_deg", 0.0))
-        along_1, along_2 = (
-            np.array([math.sin(beta), math.cos(beta)]),
-            np.array([math.cos(alpha), -math.sin(alpha)]),
-        )
-        first, second = np.outer(along_1, along_1), np.outer(along_2, along_2)
+        one = tables["link1"]
+        two = tables["link2"]
+        wheel = tables["wheel"]
+        beta = math.radians(one.get("angle_deg", 0.0))
+        alpha = math.radians(two.get("angle_deg", 0.0))
+        along_1 = np.array([math.sin(beta), math.cos(beta)])
+        along_2 = np.array([math.cos(alpha), -math.sin(alpha)])
+        first = np.outer(along_1, along_1)
+        second = np.outer(along_2, along_2)
         contact = tables["contact"]
         return cls(
             tables["shoe"]["mass"],
@@ -54,7 +56,8 @@ class Shoe:
     @property
     def modes(self) -> NDArray[np.complex128]:
         """Eigenvalues of (6)-(7), 1/s, the least stable first."""
-        zero, one = np.zeros((2, 2)), np.eye(2)
+        zero = np.zeros((2, 2))
+        one = np.eye(2)
         scale = math.sqrt(float(np.abs(self.stiffness).max()) / self.m)  # rad/s: the matrix is of the order of one
         lower = [-self.stiffness / (self.m * scale**2), -self.b / (self.m * scale)]
         found = scale * np.linalg.eigvals(np.block([[zero, one], lower]))
@@ -85,7 +88,8 @@ class Shoe:
         unstable = [phi for phi in grid if replace(self, phi=float(phi)).rate > 0.0]
         if not unstable:
             return None
-        low, high = max(float(unstable[0]) - 0.01, 0.0), float(unstable[0])
+        low = max(float(unstable[0]) - 0.01, 0.0)
+        high = float(unstable[0])
         for _ in range(30):
             middle = 0.5 * (low + high)
             low, high = (low, middle) if replace(self, phi=middle).rate > 0.0 else (middle, high)
@@ -128,7 +132,8 @@ def random_shoes(stratum: str, seed: int) -> Iterator[Tables]:
 
 def _slow_down(rng: np.random.Generator, tables: Tables) -> None:
     """Change dashpots and friction until the slowest mode changes little in half of the run."""
-    seconds, least = 0.5 * tables["solver"]["duration"], 10.0 ** rng.uniform(-3.0, -1.0)
+    seconds = 0.5 * tables["solver"]["duration"]
+    least = 10.0 ** rng.uniform(-3.0, -1.0)
     tables["initial"] = {"at": "equilibrium", "x": 1e-3 * abs(float(Shoe.of(tables).rest[1]))}
     for _ in range(60):
         if abs(Shoe.of(tables).rate) * seconds <= least:
@@ -139,7 +144,8 @@ def _slow_down(rng: np.random.Generator, tables: Tables) -> None:
 
 
 def _links(rng: np.random.Generator, undamped: float) -> Tables:
-    mass, c_1 = 10.0 ** rng.uniform(-1.0, 2.0), 10.0 ** rng.uniform(6.0, 8.0)
+    mass = 10.0 ** rng.uniform(-1.0, 2.0)
+    c_1 = 10.0 ** rng.uniform(6.0, 8.0)
     contact = c_1 * 10.0 ** rng.uniform(-1.0, 1.0)
     c_2 = (c_1 + contact) * 10.0 ** rng.uniform(-0.3, 0.3)
     kind = str(rng.choice(DAMPING, p=[undamped, 0.65 - undamped, 0.15, 0.2]))
@@ -164,7 +170,8 @@ def _links(rng: np.random.Generator, undamped: float) -> Tables:
 def _move(rng: np.random.Generator, tables: Tables, surfaces: str) -> None:
     """Give a shoe its wheel speed, roughness, start and time."""
     shoe = Shoe.of(tables)
-    depth, fast = abs(float(shoe.rest[1])), shoe.fast
+    depth = abs(float(shoe.rest[1]))
+    fast = shoe.fast
     slowest = -1.3 if surfaces == "full" else -2.5
     speed = 2.0 * math.pi * fast * depth * 10.0 ** rng.uniform(slowest, 1.0)  # of what lifts the pad off
     tables["wheel"]["angular_speed"] *= speed / 0.5 if surfaces != "smooth" or rng.uniform() > 0.03 else 0.0

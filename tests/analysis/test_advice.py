@@ -48,7 +48,8 @@ def unstable_shoes(seed: int) -> Iterator[tuple[Case, Tables]]:
 def test_sensitivities_of_the_minimal_model_are_those_of_its_closed_form() -> None:
     """φ of flutter without dashpots, differentiated by mpmath with 30 digits."""
     case = make(MODE_COUPLING)
-    one, two = case.link1, case.link2
+    one = case.link1
+    two = case.link2
     values = {
         "mass": 1.0,
         "c_1": one.stiffness,
@@ -59,10 +60,13 @@ def test_sensitivities_of_the_minimal_model_are_those_of_its_closed_form() -> No
     values["k"] = case.contact.stiffness
 
     def flutter(**v: Any) -> Any:
-        beta, alpha = v["beta"] * mpmath.pi / 180, v["alpha"] * mpmath.pi / 180
-        s, c = (mpmath.sin(beta), mpmath.cos(beta)), (mpmath.sin(alpha), mpmath.cos(alpha))
+        beta = v["beta"] * mpmath.pi / 180
+        alpha = v["alpha"] * mpmath.pi / 180
+        s = (mpmath.sin(beta), mpmath.cos(beta))
+        c = (mpmath.sin(alpha), mpmath.cos(alpha))
         k = 2 * case.contact.half_length * v["k"]
-        xx, yy = v["c_1"] * s[0] ** 2 + v["c_2"] * c[1] ** 2, v["c_1"] * s[1] ** 2 + v["c_2"] * c[0] ** 2
+        xx = v["c_1"] * s[0] ** 2 + v["c_2"] * c[1] ** 2
+        yy = v["c_1"] * s[1] ** 2 + v["c_2"] * c[0] ** 2
         xy = -(v["c_1"] * s[0] * s[1] - v["c_2"] * c[0] * c[1])
         return (xy + (xx - yy - k) ** 2 / (4 * xy)) / k
 
@@ -180,12 +184,11 @@ def test_a_shoe_that_nothing_presses_is_advised_an_angle_at_which_it_is_pressed_
 
 def presses_by(case: Case) -> float:
     """F_y over the load in steady sliding."""
-    alpha, beta = math.radians(case.link2.angle_deg), math.radians(case.link1.angle_deg)
-    c_1, c_2, k = (
-        case.link1.stiffness,
-        case.link2.stiffness,
-        2.0 * case.contact.half_length * case.contact.stiffness,
-    )
+    alpha = math.radians(case.link2.angle_deg)
+    beta = math.radians(case.link1.angle_deg)
+    c_1 = case.link1.stiffness
+    c_2 = case.link2.stiffness
+    k = 2.0 * case.contact.half_length * case.contact.stiffness
     slides = math.cos(alpha) + case.friction.coefficient * math.sin(alpha)
     leans = math.sin(beta) - case.friction.coefficient * math.cos(beta)
     determinant = c_1 * c_2 * math.cos(alpha - beta) ** 2
@@ -361,7 +364,8 @@ def test_no_safe_value_lies_nearer_than_the_advised_one(shoes: int) -> None:
         target = 1.2 * tables["friction"]["coefficient"]
         for path in advised_keys(case, ("shoe.mass", "link*.angle_deg", "link*.stiffness", "link*.damping")):
             found = advised(case, path, 0.2, tell)
-            angle, start = path[1] == "angle_deg", found.start
+            angle = path[1] == "angle_deg"
+            start = found.start
             grid = np.linspace(-89.0, 89.0, 357) if angle else start * np.logspace(-0.999, 0.999, 400)
             for value in grid.tolist():
                 there = {**tables, path[0]: {**tables[path[0]], path[1]: value}}
@@ -443,8 +447,11 @@ def test_an_interval_ends_where_the_shoe_locks_though_rounding_leaves_a_power_to
         contact__stiffness=424610000.0,
     )
     found = advised(case, ("link2", "stiffness"), 0.2, tell)
-    beta, alpha = math.radians(-24.495), math.radians(-44.531)
-    k, grip, c_1 = 2.0 * 0.011912 * 424610000.0, -1.2 * 1.4944, 6973400.0
+    beta = math.radians(-24.495)
+    alpha = math.radians(-44.531)
+    k = 2.0 * 0.011912 * 424610000.0
+    grip = -1.2 * 1.4944
+    c_1 = 6973400.0
     # det(S) = c1 c2 cos²(α - β) + K (cxx - grip cxy)
     slope = c_1 * math.cos(alpha - beta) ** 2 + k * math.cos(alpha) * (math.cos(alpha) + grip * math.sin(alpha))
     root = -k * c_1 * math.sin(beta) * (math.sin(beta) - grip * math.cos(beta)) / slope

@@ -34,9 +34,11 @@ def test_no_shoe_that_sticks_after_a_hard_start_has_died_out(draws: int) -> None
 @campaign
 def test_each_drum_that_swings_once_per_turn_is_forced_by_the_static_amount() -> None:
     """S z = (φ, 1) 2ak g: inertia and dashpots add (4 Hz over 200 Hz)², the length of the pad takes 0.7 %."""
-    rng, turn = np.random.default_rng(13), np.linspace(0.0, 2.0 * np.pi, 10_001)
+    rng = np.random.default_rng(13)
+    turn = np.linspace(0.0, 2.0 * np.pi, 10_001)
     for _ in range(10):
-        part, high = int(rng.integers(2, 4)), 10e-6 * rng.uniform(0.5, 3.0, 2)
+        part = int(rng.integers(2, 4))
+        high = 10e-6 * rng.uniform(0.5, 3.0, 2)
         waves = {"amplitudes": high.tolist(), "wavelengths": [3.0, 3.0 / part]}
         changes: dict[str, Any] = {
             "wheel__angular_speed": rng.uniform(6.0, 9.0),
@@ -48,7 +50,9 @@ def test_each_drum_that_swings_once_per_turn_is_forced_by_the_static_amount() ->
             "solver__step": 5e-5,
         }
         case = make(DRUM | {"roughness": {"wheel": waves}}, **changes)
-        c, k, verdict = system_of(case).coefficients, 2e7, verdict_of(case)
+        c = system_of(case).coefficients
+        k = 2e7
+        verdict = verdict_of(case)
         s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
         swing = k * 0.5 * np.ptp(high[0] * np.sin(turn) + high[1] * np.sin(part * turn))
         static = abs(float(np.linalg.solve(s, [c.phi, 1.0])[0]) * swing)
@@ -59,9 +63,12 @@ def test_each_drum_that_swings_once_per_turn_is_forced_by_the_static_amount() ->
 
 @pytest.mark.parametrize("draws", counts(3, 10))
 def test_the_amplitude_is_that_which_lasts_and_not_its_transient(draws: int) -> None:
-    rng, time = np.random.default_rng(15), INTERVAL * np.arange(20000)
+    rng = np.random.default_rng(15)
+    time = INTERVAL * np.arange(20000)
     for _ in range(draws):
-        frequency, depth, rate = rng.uniform(50.0, 200.0), rng.uniform(-0.05, 0.1), rng.uniform(2.0, 8.0)
+        frequency = rng.uniform(50.0, 200.0)
+        depth = rng.uniform(-0.05, 0.1)
+        rate = rng.uniform(2.0, 8.0)
         vx = 1e-2 * (1.0 + depth * np.exp(-rate * time)) * np.sin(2 * np.pi * frequency * time)
         motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=np.where(vx > 0.0099, 0.0, -1.0))
         verdict = lasting(motion, Context(1e-2))
@@ -73,9 +80,11 @@ def test_the_amplitude_is_that_which_lasts_and_not_its_transient(draws: int) -> 
 
 @pytest.mark.parametrize("draws", counts(5, 100))
 def test_each_peak_of_a_short_record_is_right_within_its_resolution_or_left_out(draws: int) -> None:
-    rng, named = np.random.default_rng(16), 0
+    rng = np.random.default_rng(16)
+    named = 0
     for _ in range(draws):
-        cycles, frequency = 10.0 ** rng.uniform(0.0, 1.7), rng.uniform(20.0, 400.0)
+        cycles = 10.0 ** rng.uniform(0.0, 1.7)
+        frequency = rng.uniform(20.0, 400.0)
         samples = int(cycles / frequency / INTERVAL)
         time = INTERVAL * np.arange(samples)
         vx = np.sin(2.0 * np.pi * frequency * time + rng.uniform(0.0, 6.0))

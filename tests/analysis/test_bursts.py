@@ -55,7 +55,8 @@ def test_a_ring_down_has_died_out_and_a_steady_tone_is_one_burst() -> None:
 
 
 def test_an_acceleration_gives_the_amplitude_of_the_displacement() -> None:
-    turn, size = 2.0 * np.pi * 200.0, 3e-6
+    turn = 2.0 * np.pi * 200.0
+    size = 3e-6
     values = -(turn**2) * size * np.sin(turn * TIME)
     found = look(Signal(values, 1.0 / RATE), quantity=Measurand.ACCELERATION).verdict
     assert found.amplitude == pytest.approx(size, rel=0.02)
@@ -66,7 +67,8 @@ def test_an_acceleration_gives_the_amplitude_of_the_displacement() -> None:
 
 def in_bursts(frequency: float, count: int, noise: float, seed: int = 4) -> np.ndarray:
     """As many bursts as would fill 0.4 s, with noise."""
-    starts, long = (np.arange(count) + 0.3) / count, 0.4 / count
+    starts = (np.arange(count) + 0.3) / count
+    long = 0.4 / count
     values = sum((tone(frequency, start, start + long, 1.0) for start in starts), np.zeros(len(TIME)))
     return values + noise * np.random.default_rng(seed).normal(size=len(TIME))
 

@@ -43,7 +43,8 @@ def test_friction_that_can_wedge_the_shoe_within_a_step_is_told() -> None:
 @pytest.mark.parametrize("phi", [0.0, 0.5, 1.0])
 def test_amplification_of_the_half_weights_is_the_trapezoidal_rule(phi: float) -> None:
     system = system_of(make(MODE_COUPLING, friction__coefficient=phi, solver__step=0.1))
-    c, k = system.coefficients, system.contact_stiffness
+    c = system.coefficients
+    k = system.contact_stiffness
     a = np.zeros((4, 4))
     a[:2, 2:] = np.eye(2)
     a[2:, :2] = -np.array([[c.c_xx, c.c_xy + phi * k], [c.c_xy, c.c_yy + k]]) / c.m
@@ -56,7 +57,8 @@ def test_amplification_of_the_half_weights_is_the_trapezoidal_rule(phi: float) -
 
 def test_amplification_predicts_the_growth_of_a_run() -> None:
     case = make(MODE_COUPLING, solver__step=0.05, solver__duration=60.0, initial__x=1e-6)
-    system, result = system_of(case), simulate(case)
+    system = system_of(case)
+    result = simulate(case)
     values = eigvals(amplification(system.coefficients, system.weights, system.scheme, system.contact_stiffness))
     fastest = values[np.argmax(np.abs(values))]
     late = result.vx[-400:]  # only the growing pair is left: v(n+1) = 2 Re(λ) v(n) - |λ|² v(n-1)

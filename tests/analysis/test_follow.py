@@ -29,7 +29,8 @@ def test_modes_of_the_minimal_model_meet_as_its_closed_form_says() -> None:
     found = list(followed(tuple(modes(c, 4.0 / 3.0, phi)) for phi in frictions))
     for phi, pair in zip(frictions, found, strict=True):
         root = np.emath.sqrt(1.0 - 4.0 * phi / 3.0)  # of ω² = 2 ± root: real below 0.75
-        low, high = 1j * np.sqrt(2.0 - root + 0j), 1j * np.sqrt(2.0 + root + 0j)
+        low = 1j * np.sqrt(2.0 - root + 0j)
+        high = 1j * np.sqrt(2.0 + root + 0j)
         expected = [low, high] if phi < 0.75 else sorted([low, high], key=lambda value: -value.real)
         # where modes meet, rounding of 1e-16 in the squares is one of 1e-8 in their roots
         assert values_of(pair) == pytest.approx(expected, abs=1e-7 if abs(phi - 0.75) < 0.01 else 1e-12)
@@ -64,7 +65,8 @@ def test_a_gap_leaves_the_modes_in_their_order() -> None:
 @pytest.mark.parametrize("shoes", counts(10, 100))
 def test_neighbours_are_nearest_wherever_two_eigenvalues_are_far_apart(shoes: int) -> None:
     """The eigenvalues are computed here, from the whole matrix; modes apart by ten steps cannot be confused."""
-    rng, compared = np.random.default_rng(8), 0
+    rng = np.random.default_rng(8)
+    compared = 0
     for _ in range(shoes):
         c, k = random_shoe(rng, 10.0 ** rng.uniform(1.0, 4.0))
         frictions = np.linspace(0.0, 2.0, 201)

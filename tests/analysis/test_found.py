@@ -62,7 +62,8 @@ def test_none_of_its_neighbours_is_called_forced(seed: int) -> None:
 @campaign
 @pytest.mark.parametrize("seed", range(10))
 def test_no_line_near_an_own_frequency_is_counted_as_forced(seed: int) -> None:
-    name, rng = "a line on its own mode, in full contact", np.random.default_rng(seed)
+    name = "a line on its own mode, in full contact"
+    rng = np.random.default_rng(seed)
     mass = SHOES[name]["shoe"]["mass"] * float(
         rng.uniform(0.85, 1.15)
     )  # own frequency within two bins of the line
@@ -110,7 +111,8 @@ def test_a_limit_cycle_that_settles_by_its_dashpots_alone_is_not_settled(
     name: str, later: tuple[float | None, float | None]
 ) -> None:
     """Sliding is unstable at tens to hundreds of 1/s, which says nothing of a shoe off the wheel."""
-    verdict, shoe = judged(name), Shoe.of(SHOES[name])
+    verdict = judged(name)
+    shoe = Shoe.of(SHOES[name])
     assert (verdict.excitation, verdict.settled) == (Excitation.SELF_EXCITED, False)
     told = re.search(r"may settle at only ([\d.]+) 1/s: run at least", verdict.reasons[1])
     assert told is not None
@@ -206,8 +208,11 @@ def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple
 @pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
 def test_the_spread_of_a_forced_motion_holds_what_a_step_changes_beside_a_resonance(scheme: str) -> None:
     """The step moves it by 3 %, of which (ωh)²/4 is 0.4 %."""
-    name, step = "forced beside the resonance of an open pad", 6.6549e-05
-    true, spreads = 2.891385e-6, []  # by another integrator, with 1000 nodes and a quarter of the step
+    name = "forced beside the resonance of an open pad"
+    step = 6.6549e-05
+    # by another integrator, with 1000 nodes and a quarter of the step
+    true = 2.891385e-6
+    spreads = []
     for part in (1.0, 0.25):
         verdict = judged(name, solver__scheme=scheme, solver__step=part * step, contact__nodes=512)
         assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
@@ -278,7 +283,8 @@ def test_waves_that_beat_more_slowly_than_the_run_force_the_sum_of_their_amplitu
     changes: dict[str, Any] = {"friction__coefficient": 0.3, "wheel__angular_speed": 8.0, "solver__duration": 0.6}
     tables = SQUEAL | {"roughness": {"wheel": waves}}
     case = make(tables, **changes, link1__damping=3000.0, link2__damping=3000.0)
-    verdict, c = verdict_of(case), system_of(case).coefficients
+    verdict = verdict_of(case)
+    c = system_of(case).coefficients
     swings = []
     for g, length in zip(waves["amplitudes"], waves["wavelengths"], strict=True):
         k = 2.0 * math.pi / length
@@ -343,7 +349,8 @@ def test_a_dozen_cycles_that_have_not_settled_are_no_vibration() -> None:
 def test_a_motion_that_can_neither_stick_nor_open_any_more_is_linear_before_its_last_quarter_is() -> None:
     name = "has just ceased to stick"
     tables = SHOES[name]
-    verdict, system = judged(name), system_of(make(tables))
+    verdict = judged(name)
+    system = system_of(make(tables))
     assert verdict.regime is Regime.DAMPED
     assert verdict.growth_rate == pytest.approx(Shoe.of(tables).rate, rel=1e-9)
     later = solve(replace(system, duration=8.0 * system.duration)).rows
@@ -364,7 +371,8 @@ def asked(verdict: Verdict, duration: float) -> float | None:
 
 
 def test_a_forced_motion_has_settled_after_the_time_that_is_asked_for() -> None:
-    verdict, duration = judged("forced, not yet"), SHOES["forced, not yet"]["solver"]["duration"]
+    verdict = judged("forced, not yet")
+    duration = SHOES["forced, not yet"]["solver"]["duration"]
     told = ASKED.search(" ".join(verdict.reasons))
     assert told is not None
     again = judged("forced, not yet", float(told[1]) / duration)
@@ -375,7 +383,8 @@ def test_a_forced_motion_has_settled_after_the_time_that_is_asked_for() -> None:
 
 @pytest.mark.parametrize("name", ["forced from the start", "forced from the start, waves shorter than its period"])
 def test_linear_forced_motion_has_settled_after_the_time_that_is_asked_for_once(name: str) -> None:
-    verdict, duration = judged(name), SHOES[name]["solver"]["duration"]
+    verdict = judged(name)
+    duration = SHOES[name]["solver"]["duration"]
     told = ASKED.search(" ".join(verdict.reasons))
     assert told is not None
     again = judged(name, 1.001 * float(told[1]) / duration)
@@ -398,7 +407,8 @@ def test_a_shoe_that_winds_up_its_links_does_not_vibrate_for_good() -> None:
 def test_a_cycle_that_impacts_shift_has_settled_with_the_step_that_is_asked_for(
     name: str, frequency: float, amplitude: float
 ) -> None:
-    verdict, step = judged(name), SHOES[name]["solver"]["step"]
+    verdict = judged(name)
+    step = SHOES[name]["solver"]["step"]
     told = re.search(r"impacts of so few steps may .* take a solver.step of (\S+) s, or", verdict.reasons[1])
     assert told is not None
     assert not verdict.settled
@@ -431,7 +441,8 @@ def test_a_cycle_that_impacts_shift_by_less_than_half_has_spreads_that_hold_it()
 
 @campaign
 def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_reason() -> None:
-    tried, kinds = 0, [random_shoes(stratum, 5) for stratum in ("smooth", "full", "open")]
+    tried = 0
+    kinds = [random_shoes(stratum, 5) for stratum in ("smooth", "full", "open")]
     for tables in chain.from_iterable(zip(*kinds, strict=True)):
         duration = tables["solver"]["duration"]
         if duration > 2e4 * tables["solver"]["step"]:
@@ -573,7 +584,8 @@ def test_what_friction_feeds_is_not_called_forced_as_steps_end_at_its_events(nam
     verdict = judged_to_its_tolerance(name)
     assert (verdict.regime, verdict.excitation) == (regime, Excitation.SELF_EXCITED)
     found = verdict.evidence
-    given, left = found["power_of_friction"] + found["power_of_roughness"], found["power_left"]
+    given = found["power_of_friction"] + found["power_of_roughness"]
+    left = found["power_left"]
     assert given == pytest.approx(found["power_dashpots"] + left, abs=0.02 * found["power_dashpots"])
     error = math.hypot(found["friction_error"], found["roughness_error"])
     assert abs(left) <= 3.0 * error

@@ -67,9 +67,11 @@ def test_a_rest_and_its_modes_obey_the_equations() -> None:
     for system in shoes():
         if (theory := linear_theory(system, system.belt_speed)) is None:
             continue
-        c, k = system.coefficients, system.contact_stiffness
+        c = system.coefficients
+        k = system.contact_stiffness
         grip = math.copysign(c.phi, system.belt_speed)
-        (x, y), load = theory.rest, system.load_at_start
+        x, y = theory.rest
+        load = system.load_at_start
         along = c.c_xx * x + c.c_xy * y + load * c.sin_beta - grip * theory.force
         across = c.c_xy * x + c.c_yy * y + load * c.cos_beta - theory.force
         assert max(abs(along), abs(across)) <= 1e-12 * (abs(load) + (c.c_xx + c.c_yy) * abs(theory.rest).max())

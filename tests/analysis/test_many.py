@@ -57,7 +57,9 @@ def test_pieces_of_a_long_history_tell_since_when_something_holds(monkeypatch: p
     """By the last sample at which it does not, also where that lies in another piece."""
     monkeypatch.setattr(evidence, "LONGEST", 10)
     values = np.zeros((4, 35))
-    values[1, 34], values[2, [3, 12]], values[3, 29] = 1.0, 1.0, 1.0
+    values[1, 34] = 1.0
+    values[2, [3, 12]] = 1.0
+    values[3, 29] = 1.0
     whole = Part(stacked([history_of(35, x=each) for each in values]), 0, 35)
     assert whole.since("x", lambda x: x == 0.0).tolist() == [0, 35, 13, 30]
     for row, expected in zip(values, (0, 35, 13, 30), strict=True):

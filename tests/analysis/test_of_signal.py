@@ -86,8 +86,11 @@ def test_what_was_changed_is_reported() -> None:
 
 def test_frequency_and_amplitude_of_a_sine_are_those_of_its_displacement() -> None:
     time = np.arange(20000) / 1000.0
-    frequency, size, stiffness = 20.0, 3e-5, 4e6
-    x, v = size * np.sin(40.0 * np.pi * time), 40.0 * np.pi * size * np.cos(40.0 * np.pi * time)
+    frequency = 20.0
+    size = 3e-5
+    stiffness = 4e6
+    x = size * np.sin(40.0 * np.pi * time)
+    v = 40.0 * np.pi * size * np.cos(40.0 * np.pi * time)
     for values, quantity in (
         (x, Measurand.DISPLACEMENT),
         (v, Measurand.VELOCITY),

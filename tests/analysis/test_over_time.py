@@ -19,7 +19,8 @@ from tests.campaign import campaign
 from tests.commands import ROOT, brakecli
 
 SYSTEM = replace(system_of(parse_case(*read_text(str(ROOT / "cases" / "brake-stop.toml"))).case), interval=1e-4)
-FREQUENCY, AMPLITUDE = 250.0, 3e-5
+FREQUENCY = 250.0
+AMPLITUDE = 3e-5
 
 
 def burst(first: float, last: float, *, amplitude: float = AMPLITUDE, samples: int = 40_000) -> History:

@@ -49,7 +49,8 @@ def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime
 def test_where_rises_miss_the_lines_of_a_motion_the_strongest_line_is_its_frequency() -> None:
     """In most cycles of the line at 100 Hz the one at 237 Hz makes no further rise, in some it does."""
     lines = [size * np.sin(2.0 * np.pi * frequency * TIME) for size, frequency in ((1.0, 100.0), (0.9, 237.0))]
-    slides, known = made(lines[0] + lines[1]), Context(3.0, growth=lambda: 1.0, settles=100.0)
+    slides = made(lines[0] + lines[1])
+    known = Context(3.0, growth=lambda: 1.0, settles=100.0)
     verdict = lasting(slides, known)
     assert verdict.regime is Regime.QUASI_HARMONIC
     assert verdict.frequency == pytest.approx(100.0, abs=0.1)
@@ -58,7 +59,8 @@ def test_where_rises_miss_the_lines_of_a_motion_the_strongest_line_is_its_freque
 
 def test_an_amplitude_that_varies_by_as_much_as_itself_is_not_settled() -> None:
     """Two fifths of the cycles swing five times as far as others, in turns as long as the envelope's windows."""
-    known, settled = Context(3.0, growth=lambda: 1.0, settles=100.0), []
+    known = Context(3.0, growth=lambda: 1.0, settles=100.0)
+    settled = []
     time = INTERVAL * np.arange(100_000)
     for low in (0.2, 0.9):
         sizes = np.where(time % 0.25 < 0.1, 1.0, low)
@@ -99,8 +101,13 @@ def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:
 @pytest.mark.parametrize(("part", "locks"), [(0.98, False), (1.02, True)])
 def test_a_shoe_that_locks_itself_is_told_that_no_longer_run_will_see_it_slip(part: float, *, locks: bool) -> None:
     """The wheel draws x, the links ask for a force and press the pad: both are linear in x, and y gives way."""
-    angle, first, second, contact = math.radians(40.0), 1e7, 1.2e7, 2e6
-    xx, xy, yy = second * math.cos(angle) ** 2, second * math.sin(angle) * math.cos(angle), first
+    angle = math.radians(40.0)
+    first = 1e7
+    second = 1.2e7
+    contact = 2e6
+    xx = second * math.cos(angle) ** 2
+    xy = second * math.sin(angle) * math.cos(angle)
+    yy = first
     yy += second * math.sin(angle) ** 2
     limit = (xx - xy**2 / (yy + contact)) / (contact * xy / (yy + contact))
     changes: dict[str, Any] = {"link2__angle_deg": -40.0, "friction__coefficient": part * limit}

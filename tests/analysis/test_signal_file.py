@@ -213,7 +213,8 @@ def test_every_quantity_has_its_units(quantity: str, unit: str, size: float, tmp
 
 @pytest.mark.parametrize(("kind", "largest"), [("u1", 128), ("i2", 1 << 15), ("i4", 1 << 31), ("f4", 1)])
 def test_a_sound_file_gives_its_rate_and_numbers_up_to_one(kind: str, largest: int, tmp_path: Path) -> None:
-    path, wave = str(tmp_path / "squeal.wav"), 0.5 * SINE
+    path = str(tmp_path / "squeal.wav")
+    wave = 0.5 * SINE
     stored = wave * largest + (128.0 if kind == "u1" else 0.0)
     wavfile.write(path, 40000, (stored if kind == "f4" else np.round(stored)).astype(kind))
     signal = read_signal(path, Measurand.PRESSURE, sample_rate=40000.0)
@@ -277,7 +278,9 @@ def test_a_text_in_latin_1_keeps_its_units(tmp_path: Path, filler: int) -> None:
 
 def test_a_row_of_a_mat_file_is_a_signal_and_a_matrix_is_none(tmp_path: Path) -> None:
     with h5py.File(tmp_path / "m.mat", "w", userblock_size=512) as file:
-        file["row"], file["column"], file["matrix"] = np.eye(1, 5), np.eye(5, 1), np.eye(2, 5)
+        file["row"] = np.eye(1, 5)
+        file["column"] = np.eye(5, 1)
+        file["matrix"] = np.eye(2, 5)
     for name in ("row", "column"):
         assert read(f"{tmp_path}/m.mat:/{name}", rate=10.0).values.tolist() == [1.0, 0.0, 0.0, 0.0, 0.0]
     with pytest.raises(UnreadableResultError, match="not a row of numbers"):

@@ -29,7 +29,8 @@ def wandering(samples: int, size: float, random: np.random.Generator) -> Array:
 
 def disturbed(values: Array, part: float, random: np.random.Generator) -> Array:
     """White and impulsive noise, mains hum and drift, by a part of the size of the motion."""
-    count, size = len(values), float(values.std())
+    count = len(values)
+    size = float(values.std())
     hum = part * size * np.sin(2.0 * np.pi * 50.0 / RATE * np.arange(count))
     impulses = np.where(random.random(count) < 0.005, 2.0 * size * random.standard_t(2, count), 0.0)
     noise = 0.5 * part * size * random.normal(size=count)
@@ -39,7 +40,9 @@ def disturbed(values: Array, part: float, random: np.random.Generator) -> Array:
 
 def saw_teeth(mean: int, teeth: int, random: np.random.Generator) -> Array:
     """Loading at a constant rate, to a random height after a random time, and slips of 10 to 30 samples."""
-    fall, level, parts = int(random.integers(10, 30)), 0.0, []
+    fall = int(random.integers(10, 30))
+    level = 0.0
+    parts = []
     shape = 0.5 - 0.5 * np.cos(np.pi * np.arange(1, fall + 1) / fall)
     for wait in np.maximum(20, mean * random.lognormal(-0.1, 0.45, teeth)).astype(int):
         lowest = 0.5 * mean * (random.random() - 0.5)
@@ -64,8 +67,11 @@ def test_slow_saw_teeth_under_hum_impulses_and_drift_are_stick_slip(cases: int) 
 def test_an_oscillation_whose_amplitude_wanders_is_quasi_harmonic(cases: int) -> None:
     for seed in range(cases):
         random = np.random.default_rng(seed)
-        turn, damping = 2.0 * np.pi * random.uniform(20.0, 90.0) / RATE, 10.0 ** random.uniform(-2.2, -1.2)
-        factor, state, values = np.exp((1j - damping) * turn), 0j, np.empty(20000)
+        turn = 2.0 * np.pi * random.uniform(20.0, 90.0) / RATE
+        damping = 10.0 ** random.uniform(-2.2, -1.2)
+        factor = np.exp((1j - damping) * turn)
+        state = 0j
+        values = np.empty(20000)
         for i, push in enumerate(random.normal(size=len(values))):
             state = factor * state + push
             values[i] = state.imag
@@ -78,13 +84,16 @@ def test_an_oscillation_whose_amplitude_wanders_is_quasi_harmonic(cases: int) ->
 def test_ring_downs_after_impacts_are_never_stick_slip(cases: int) -> None:
     for seed in range(cases):
         random = np.random.default_rng(seed)
-        turn, damping = 2.0 * np.pi * random.uniform(0.01, 0.1), 10.0 ** random.uniform(-2.7, -0.82)
+        turn = 2.0 * np.pi * random.uniform(0.01, 0.1)
+        damping = 10.0 ** random.uniform(-2.7, -0.82)
         wait = 2.0 * np.pi / turn * random.uniform(6.0, 40.0)
         begins = np.cumsum(np.full(40, wait) if seed % 2 else wait * random.uniform(0.5, 1.5, 40))
         time = np.arange(int(begins[-1] + wait))
-        values, ring = np.zeros(len(time)), np.sin if seed % 4 > 1 else np.cos
+        values = np.zeros(len(time))
+        ring = np.sin if seed % 4 > 1 else np.cos
         for begin in begins.astype(int):
-            since, sign = time[begin:] - begin, random.choice([-1.0, 1.0]) if seed % 8 > 3 else 1.0
+            since = time[begin:] - begin
+            sign = random.choice([-1.0, 1.0]) if seed % 8 > 3 else 1.0
             size = sign * random.lognormal(0.0, 0.3)
             values[begin:] += size * np.exp(-damping * turn * since) * ring(turn * since)
         values += 0.03 * values.std() * random.normal(size=len(values))
@@ -107,7 +116,8 @@ def test_three_lines_in_step_are_never_stick_slip(second: float, third: float, d
 @pytest.mark.parametrize("seed", range(8))
 def test_spikes_of_one_sign_are_never_stick_slip(seed: int) -> None:
     random = np.random.default_rng(seed)
-    values, places = random.normal(size=10000), random.choice(10000, 30, replace=False)
+    values = random.normal(size=10000)
+    places = random.choice(10000, 30, replace=False)
     values[places] += random.uniform(8.0, 40.0) * (random.lognormal(0.0, 0.4, 30) if seed % 2 else 1.0)
     for quantity in BOTH:
         assert judged(values, quantity).regime != Regime.RELAXATION

@@ -94,7 +94,9 @@ def test_a_peak_of_few_bins_or_cycles_is_left_out(frequency: float, samples: int
 
 def test_no_peak_is_named_beside_a_stronger_line_that_is_not_resolved() -> None:
     lines = spectrum(history(sine(8.0, 2000, 0.2) + sine(312.0, 2000)), 0)
-    slow, density, duration = 2.0 * float(lines.frequency[1]), lines.density["vx"], 2000 * INTERVAL
+    slow = 2.0 * float(lines.frequency[1])
+    density = lines.density["vx"]
+    duration = 2000 * INTERVAL
     assert peak(lines.frequency, density, duration, slow) is None
     assert peak(lines.frequency, density, duration, 312.0) == peak(lines.frequency, density, duration)
 

@@ -58,7 +58,8 @@ def test_minimal_model_loses_stability_at_three_quarters() -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_closed_form_agrees_with_eigenvalues_on_random_undamped_shoes(sign: float) -> None:
     rng = np.random.default_rng(2)
-    flutter, divergence = 0, 0
+    flutter = 0
+    divergence = 0
     for _ in range(1000):
         c, k = random_shoe(rng, 0.0)
         phi_flutter, phi_divergence = undamped_critical(c, k, sign)
@@ -71,7 +72,8 @@ def test_closed_form_agrees_with_eigenvalues_on_random_undamped_shoes(sign: floa
         # 10^-3 above, a pair that has met splits by about sqrt(10^-3) of its distance; rounding splits by 1e-7.
         assert below.real.max() < 1e-6 * size
         assert above.real.max() > below.real.max() + 1e-7 * size
-        flutter, divergence = flutter + (phi_flutter is not None), divergence + (phi_divergence is not None)
+        flutter = flutter + (phi_flutter is not None)
+        divergence = divergence + (phi_divergence is not None)
     assert flutter > 300
     assert divergence > 300
 
@@ -84,7 +86,8 @@ def test_every_crossing_of_random_damped_shoes_is_found(shoes: int) -> None:
         c, k = random_shoe(rng, 10.0 ** rng.uniform(1.0, 4.0))
         found = crossings(c, k, 1.0)
         frictions = np.linspace(0.0, 3.0, 3001)[1:]
-        frictionless, with_unit_grip = full_matrix(c, k, 0.0), full_matrix(c, k, 1.0)
+        frictionless = full_matrix(c, k, 0.0)
+        with_unit_grip = full_matrix(c, k, 1.0)
         matrices = frictionless + frictions[:, None, None] * (with_unit_grip - frictionless)
         rates = np.linalg.eigvals(matrices).real.max(axis=1)
         changes = frictions[1:][(rates[1:] > 0.0) != (rates[:-1] > 0.0)]
@@ -110,7 +113,8 @@ def test_growth_is_zero_at_a_crossing() -> None:
 @pytest.mark.parametrize("alpha", [1.0, 5.0, 20.0, 45.0])
 @pytest.mark.parametrize("ratio", [0.02, 0.2, 1.0])
 def test_least_critical_friction_lies_at_c2_equal_c1_plus_k(alpha: float, ratio: float) -> None:
-    c_1, k = 1e7, ratio * 1e7
+    c_1 = 1e7
+    k = ratio * 1e7
 
     def critical(c_2: float) -> float:
         c = coefficients(mass=10, c_1=c_1, b_1=0, beta_deg=0, c_2=c_2, b_2=0, alpha_deg=alpha, phi=0)
@@ -208,7 +212,9 @@ def test_a_shoe_is_pressed_from_a_millionth_of_its_load_on() -> None:
         return system_of(make(SQUEAL, link1__angle_deg=90.0 - math.degrees(delta), link2__angle_deg=0.0))
 
     system = shoe(1e-3)
-    c, k, load = system.coefficients, system.contact_stiffness, system.load_at_start
+    c = system.coefficients
+    k = system.contact_stiffness
+    load = system.load_at_start
     equations = [[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]]  # Eqs. (6) and (7) without motion
     _, y = np.linalg.solve(equations, [-load * c.sin_beta, -load * c.cos_beta])
     least = 1e-6 * load * 1e-3 / (-k * y)  # to the curvature of that, some parts in a thousand
@@ -278,7 +284,8 @@ def test_discrete_growth_is_that_of_a_run_with_the_same_step(scheme: str, theta:
 
 def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:
     rough = {"roughness__wheel": {"amplitudes": [1e-5], "wavelengths": [0.03]}}
-    flat, touching = stability(system_of(make(SQUEAL))), stability(system_of(make(SQUEAL, **rough)))
+    flat = stability(system_of(make(SQUEAL)))
+    touching = stability(system_of(make(SQUEAL, **rough)))
     assert flat.critical is not None
     assert touching.critical is not None
     assert touching.critical.friction == pytest.approx(flat.critical.friction, abs=1e-9)
@@ -298,7 +305,8 @@ def test_mean_stiffness_is_the_slope_of_the_mean_force() -> None:
     from brakecli.solver.steady_sliding import mean_contact, tabulated
 
     system = system_of(make(ROUGH))
-    mean, table = partial(mean_contact, system), tabulated(system)
+    mean = partial(mean_contact, system)
+    table = tabulated(system)
     tried = 0
     for y in (-1e-4, -3e-5, 1e-5, 6e-5):
         # Over 1024 places of 256 nodes each, kinks in steps of 1e-8 m average out to a relative 1e-3.
@@ -345,8 +353,10 @@ def test_a_mean_over_waves_has_a_bar_that_holds_a_finer_one() -> None:
     assert report.equilibrium is not None
     assert report.critical_error is not None
     assert 1e-4 < report.critical_error < 1e-2
-    y, layer = report.equilibrium.y, build_layer(system.evaluate, system.pad)
-    parts, sums = (np.arange(16 * PLACES) + 0.5) / (16 * PLACES), np.zeros(3)
+    y = report.equilibrium.y
+    layer = build_layer(system.evaluate, system.pad)
+    parts = (np.arange(16 * PLACES) + 0.5) / (16 * PLACES)
+    sums = np.zeros(3)
     add_places(y, 16.0 * averaged_length(system) * parts, 2.0 * np.sin(np.pi * parts) ** 2, layer, sums)
     finer = float(sums[1]) / len(parts)
     assert abs(report.contact_stiffness - finer) < report.contact_stiffness_error < 2e-3 * finer

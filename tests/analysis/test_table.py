@@ -141,10 +141,8 @@ def test_the_last_row_of_each_part_always_holds() -> None:
 
 def test_no_sentence_has_a_number_that_is_not_known() -> None:
     """Whatever is not known; `sentences.read_all` reads what each record of the tests is told."""
-    rng, numbers = (
-        np.random.default_rng(47),
-        [name for name, value in MOVING._asdict().items() if type(value) is float],
-    )
+    rng = np.random.default_rng(47)
+    numbers = [name for name, value in MOVING._asdict().items() if type(value) is float]
     records = [{**SHAKEN, **each} for each in ROUGH_ROWS.values()] + [*SMOOTH_ROWS.values(), *LOOK_ROWS.values()]
     for record in records:
         for _ in range(20):

@@ -40,7 +40,8 @@ DRUM: dict[str, Any] = {  # swings once per turn of 3 m
 @pytest.mark.parametrize("friction", [0.3, 0.5, 0.57, 0.574, 0.5765, 0.58])
 def test_a_slow_motion_is_judged_by_its_eigenvalues(friction: float) -> None:
     case = make(SQUEAL, friction__coefficient=friction, wheel__angular_speed=1.0)
-    verdict, mode = verdict_of(case), stability(system_of(case)).modes[0]
+    verdict = verdict_of(case)
+    mode = stability(system_of(case)).modes[0]
     assert verdict.regime is (Regime.DAMPED if mode.growth < 0.0 else Regime.UNDECIDED)
     assert verdict.excitation is Excitation.NONE
     assert (verdict.growth_rate, verdict.ringing_frequency) == (mode.growth, mode.frequency)
@@ -115,7 +116,8 @@ def test_the_amplitude_of_what_dies_out_is_what_is_left_and_that_of_its_first_te
     theory = linear_theory(system, system.belt_speed)
     assert theory is not None
     slow = int(np.argmax(theory.values.real))
-    value, vector = theory.values[slow], 1e-7 * theory.vectors[:, slow] / theory.vectors[0, slow]
+    value = theory.values[slow]
+    vector = 1e-7 * theory.vectors[:, slow] / theory.vectors[0, slow]
     start = dict(zip(("x", "y", "vx", "vy"), vector.real.tolist(), strict=True))
     start = {f"initial__{name}": each for name, each in {"at": "equilibrium", **start}.items()}
     verdict = verdict_of(make(SQUEAL, **changes, **start))
@@ -139,7 +141,8 @@ def test_a_drum_that_swings_once_per_turn_is_forced_with_the_amplitude_that_last
     assert verdict.settled
     # So slow a wave forces the static displacement under the force that it adds: S z = (φ, 1) 2ak g sin, with both
     # waves from the same phase; inertia adds less than 1e-3. sinc(ωa) is 1 within 0.7 %.
-    c, k = system_of(case).coefficients, 2e7
+    c = system_of(case).coefficients
+    k = 2e7
     s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
     turn = np.linspace(0.0, 2.0 * np.pi, 10_001)
     swing = np.linalg.solve(s, [c.phi, 1.0]) * k * 0.5 * np.ptp(30e-6 * np.sin(turn) + 10e-6 * np.sin(2.0 * turn))
@@ -172,14 +175,16 @@ RINGS: dict[str, Any] = {
 @pytest.mark.parametrize("duration", [2.0, 5.0])
 def test_the_variation_of_the_torque_waits_for_the_force_where_y_rings_longer_than_x(duration: float) -> None:
     case = make(RINGS, solver__duration=duration)
-    verdict, system = verdict_of(case), system_of(case)
+    verdict = verdict_of(case)
+    system = system_of(case)
     assert verdict.settled
     if duration < 4.0:
         assert verdict.torque_variation is None
         assert any("the friction force still rings" in each for each in verdict.reasons)
         return
     # (S + iωB - ω²m) z = (φ, 1) K w, and F_y = K (w - y)
-    c, k = system.coefficients, system.contact_stiffness
+    c = system.coefficients
+    k = system.contact_stiffness
     s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
     omega = 2.0 * np.pi * 0.1 * 1.575 / 0.05
     s = s - c.m * omega**2 * np.eye(2) + 1j * omega * np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
@@ -206,7 +211,8 @@ def test_what_roughness_forces_in_full_contact_is_the_motion_that_lasts(seed: in
     tables = SQUEAL | {"roughness": {"wheel": waves}}
     changes = {"friction__coefficient": rng.uniform(0.1, 0.4), "wheel__angular_speed": rng.uniform(2.0, 6.0)}
     case = make(tables, **changes, link1__damping=3000.0, link2__damping=3000.0, solver__duration=0.6)
-    result, verdict = simulate(case), verdict_of(case)
+    result = simulate(case)
+    verdict = verdict_of(case)
     last = result.x[len(result.x) // 2 :]
     assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.DAMPED, Excitation.FORCED, True)
     # The record ends within a turn of the beat of two waves; the shoe's motion acts on the phase of a wave by the
@@ -218,13 +224,15 @@ def test_what_roughness_forces_in_full_contact_is_the_motion_that_lasts(seed: in
 def test_the_amplitude_of_many_waves_is_that_of_their_highest_meeting(waves: int) -> None:
     """Their sum is taken at sixteen times in each period of the fastest, over 64 times the run."""
     rng = np.random.default_rng(waves)
-    lengths, heights = rng.uniform(0.02, 0.04, waves), rng.uniform(1e-7, 1e-6, waves)
+    lengths = rng.uniform(0.02, 0.04, waves)
+    heights = rng.uniform(1e-7, 1e-6, waves)
     rough = {"wheel": {"wavelengths": lengths.tolist(), "amplitudes": heights.tolist()}}
     changes: dict[str, Any] = {"wheel__angular_speed": 10.0, "solver__duration": 4.0}
     system = system_of(make(SQUEAL | {"roughness": rough}, **changes))
     theory = linear_theory(system, system.belt_speed)
     assert theory is not None
-    turns, step = 2j * np.pi * theory.passing, 1.0 / (16.0 * np.abs(theory.passing).max())
+    turns = 2j * np.pi * theory.passing
+    step = 1.0 / (16.0 * np.abs(theory.passing).max())
     block = theory.waves[:, :1] * np.exp(np.outer(turns, step * np.arange(1 << 14)))
     starts = np.arange(0.0, 64.0 * 4.0, step * (1 << 14))
     bounds = [(x.min(), x.max()) for x in (np.imag(np.exp(turns * start) @ block) for start in starts)]
@@ -252,7 +260,8 @@ def test_a_forced_swing_is_one_within_its_time(duration: float) -> None:
 def test_without_friction_nothing_is_self_excited(shoes: int) -> None:
     rng = np.random.default_rng(3)
     for _ in range(shoes):
-        speed, waves = rng.uniform(1.0, 6.0), rng.uniform(0.02, 0.06, int(rng.integers(1, 4)))
+        speed = rng.uniform(1.0, 6.0)
+        waves = rng.uniform(0.02, 0.06, int(rng.integers(1, 4)))
         rough = {"amplitudes": [float(rng.uniform(1e-4, 1e-3))] * len(waves), "wavelengths": waves.tolist()}
         changes: dict[str, Any] = {"friction__coefficient": 0.0, "wheel__angular_speed": speed}
         case = make(SQUEAL | {"roughness": {"wheel": rough}}, **changes, solver__duration=0.5, contact__nodes=128)

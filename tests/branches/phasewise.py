@@ -17,7 +17,10 @@ from tests.analysis.shoes import Shoe
 
 Vector = NDArray[np.float64]
 
-OPEN, STICK, AHEAD, BEHIND = "open", "stick", "ahead of the wheel", "behind it"
+OPEN = "open"
+STICK = "stick"
+AHEAD = "ahead of the wheel"
+BEHIND = "behind it"
 STEPS = 40  # of the fastest period: 0.16 rad, so that 20 terms of the series are exact
 TERMS = 20
 BLOCK = 64
@@ -39,21 +42,27 @@ class Phasewise:
     """Exact motion (x, y, v_x, v_y) of a shoe on smooth pads, at constant speed and load."""
 
     def __init__(self, shoe: Shoe) -> None:
-        self.belt, self.phi, self.k, m = shoe.belt, shoe.phi, shoe.k, shoe.m
+        self.belt = shoe.belt
+        self.phi = shoe.phi
+        self.k = shoe.k
+        m = shoe.m
         top = float(np.abs(np.linalg.eigvalsh(shoe.c)).max()) + shoe.k * (1.0 + shoe.phi)
         fast = max(math.sqrt(top / m), float(np.abs(np.linalg.eigvalsh(shoe.b)).max()) / m)
         self.h = 2.0 * math.pi / fast / STEPS
         held = np.array([*shoe.c[0], 0.0, shoe.b[0, 1], shoe.b[0, 0] * shoe.belt + shoe.pull[0]])  # (6), ẋ = U
         normal = np.array([0.0, -shoe.k, 0.0, 0.0, 0.0])
-        pressed, sliding = np.array([0.0, -1.0, 0.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0, 0.0, -shoe.belt])
-        self.held, self.normal = held, normal
+        pressed = np.array([0.0, -1.0, 0.0, 0.0, 0.0])
+        sliding = np.array([0.0, 0.0, 1.0, 0.0, -shoe.belt])
+        self.held = held
+        self.normal = normal
         self.rows = {
             OPEN: -pressed[None],
             STICK: np.array([pressed, shoe.phi * normal - held, shoe.phi * normal + held]),
             AHEAD: np.array([pressed, sliding]),
             BEHIND: np.array([pressed, -sliding]),
         }
-        self.generators, self.stacks = {}, {}
+        self.generators = {}
+        self.stacks = {}
         for phase in self.rows:
             a = np.zeros((5, 5))
             a[0, 2] = a[1, 3] = 1.0
@@ -76,7 +85,8 @@ class Phasewise:
             return OPEN
         if z[2] != self.belt:
             return AHEAD if z[2] > self.belt else BEHIND
-        needed, most = float(self.held @ z), self.phi * float(self.normal @ z)
+        needed = float(self.held @ z)
+        most = self.phi * float(self.normal @ z)
         return STICK if abs(needed) <= most else BEHIND if needed > most else AHEAD
 
     def speed(self, state: Vector) -> Vector:
@@ -86,15 +96,18 @@ class Phasewise:
 
     def __call__(self, state: Vector, span: float, most_events: int = 2000) -> Way:
         """Carry a state over a span (s)."""
-        z, time = np.append(state, 1.0), 0.0
+        z = np.append(state, 1.0)
+        time = 0.0
         phase = self.phase(z)
-        word, zero = [phase], (-1, 0)
+        word = [phase]
+        zero = (-1, 0)
         times: list[float] = []
         low = high = z[:4]
         while True:
             left = span - time
             part, which, z, states = self._phase(phase, z, left, zero)
-            low, high = np.minimum(low, states[:, :4].min(axis=0)), np.maximum(high, states[:, :4].max(axis=0))
+            low = np.minimum(low, states[:, :4].min(axis=0))
+            high = np.maximum(high, states[:, :4].max(axis=0))
             if which < 0:
                 return Way(z[:4], tuple(word), tuple(times), low, high)
             time += part
@@ -122,8 +135,11 @@ class Phasewise:
         self, phase: str, z: Vector, left: float, zero: tuple[int, int]
     ) -> tuple[float, int, Vector, Vector]:
         """Follow one phase: how long it lasts, which margin ends it (-1: none), the state there, and others."""
-        a, rows, stack = self.generators[phase], self.rows[phase], self.stacks[phase]
-        gone, seen = 0.0, [z[None]]
+        a = self.generators[phase]
+        rows = self.rows[phase]
+        stack = self.stacks[phase]
+        gone = 0.0
+        seen = [z[None]]
         first = True
         while True:
             number = min(BLOCK, max(math.ceil((left - gone) / self.h), 1))
@@ -151,7 +167,8 @@ class Phasewise:
                 end = _series(a * self.h, states[k]).T @ part ** np.arange(TERMS + 1)
                 return left, -1, end, np.concatenate([*seen, states[: k + 1], end[None]])
             seen.append(states)
-            gone, z = gone + number * self.h, states[-1]
+            gone = gone + number * self.h
+            z = states[-1]
 
     def _event(self, a: Vector, rows: Vector, z: Vector, zero: tuple[int, int]) -> tuple[float, int] | None:
         """The part of a step after which a margin is negative for the first time, and which."""
@@ -169,11 +186,13 @@ class Phasewise:
 def _first_below(coefficients: Vector) -> float | None:
     """Where a polynomial becomes negative for the first time in 0..1, also where it does so for a moment only."""
     slope = coefficients[1:] * np.arange(1, TERMS + 1)
-    values, slopes = POWERS @ coefficients, POWERS[:, :-1] @ slope
+    values = POWERS @ coefficients
+    slopes = POWERS[:, :-1] @ slope
     if values[0] < 0.0:
         return 0.0
     for k in range(len(PARTS) - 1):
-        left, right = float(PARTS[k]), float(PARTS[k + 1])
+        left = float(PARTS[k])
+        right = float(PARTS[k + 1])
         if values[k + 1] >= 0.0:
             if not slopes[k] < 0.0 < slopes[k + 1]:
                 continue

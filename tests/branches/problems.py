@@ -19,7 +19,11 @@ class Roots(Problem):
         pace: float = 0.1,
         word: Callable[[Array, float], Hashable] = lambda u, p: "",
     ) -> None:
-        self.f, self.by_u, self.by_p, self.pace, self.word = f, by_u, by_p, pace, word
+        self.f = f
+        self.by_u = by_u
+        self.by_p = by_p
+        self.pace = pace
+        self.word = word
         self.calls = self.with_parameter = 0
 
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
@@ -47,7 +51,10 @@ class Orbits(Doubled):
     """Orbits of period k of a map x -> f(x, r), with r = low + p (high - low); u holds their k places."""
 
     def __init__(self, f: Step, low: float, high: float, k: int = 1) -> None:
-        self.f, self.low, self.high, self.k = f, low, high, k
+        self.f = f
+        self.low = low
+        self.high = high
+        self.k = k
 
     def value(self, p: float) -> float:
         return self.low + p * (self.high - self.low)
@@ -55,10 +62,15 @@ class Orbits(Doubled):
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
         places = u.reshape(self.k, -1)
         d = places.shape[1]
-        gap, by_u, by_p, maps = np.empty(u.size), np.zeros((u.size, u.size)), np.empty(u.size), []
+        gap = np.empty(u.size)
+        by_u = np.zeros((u.size, u.size))
+        by_p = np.empty(u.size)
+        maps = []
         for i, place in enumerate(places):
             image, by_place, by_r = self.f(place, self.value(p))
-            j, here, there = (i + 1) % self.k, slice(i * d, i * d + d), ((i + 1) % self.k) * d
+            j = (i + 1) % self.k
+            here = slice(i * d, i * d + d)
+            there = ((i + 1) % self.k) * d
             gap[here] = image - places[j]
             by_u[here, here] = by_place
             by_u[here, there : there + d] -= np.eye(d)
@@ -112,7 +124,8 @@ class Given(Problem):
     def __init__(
         self, maps: Callable[[float], list[list[float]]], margin: Callable[[float], float] | None = None
     ) -> None:
-        self.maps, self.margin = maps, margin
+        self.maps = maps
+        self.margin = margin
 
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
         by_p = np.zeros(1) if with_parameter else None
@@ -137,7 +150,8 @@ class Scaled(Problem):
         return float(self.chart[0])
 
     def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
-        x, q = self.origin() + 0.1 * u - 2.0, p - 0.5
+        x = self.origin() + 0.1 * u - 2.0
+        q = p - 0.5
         by_u = 0.2 * x[:, None]
         by_p = np.array([2.0 * q]) if with_parameter else None
         return Seen(x**2 + q**2 - 0.04, by_u, by_p, np.array([np.eye(1) + by_u]), "", self.origin() + 0.1 * u[0])

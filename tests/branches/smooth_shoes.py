@@ -100,13 +100,15 @@ def followed(
 ) -> Followed | None:
     """The branch of limit cycles from a flutter along a key; None without a flutter."""
     line = Line(make(tables), [key], low, high)
-    sliding, cycles = Sliding(line), Cycles(line)
+    sliding = Sliding(line)
+    cycles = Cycles(line)
     flutters = [change for change in sliding.changes(sliding.along(33)) if change.kind == "flutter"]
     if len(flutters) <= which:
         return None
     first = sliding.vibration(cycles, flutters[which])
     assert first is not None
-    begin, vibrates = cycle_of(first).amplitude, False
+    begin = cycle_of(first).amplitude
+    vibrates = False
 
     def until(point: Point) -> str | None:
         nonlocal vibrates

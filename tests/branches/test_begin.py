@@ -98,7 +98,8 @@ def of_rough(friction: float, given: bool = True, seed: int = 6) -> End:
     tables, key, low, high, _ = rough_drawn(seed, "opening")
     line = Line(make(tables), [key.replace("__", ".")], low, high)
     p = line.place(friction)
-    point, system = Forced.along(line).begun(p), line.system(p)
+    point = Forced.along(line).begun(p)
+    system = line.system(p)
     assert point is not None
     rest = steady_sliding(system)
     calm = [np.array(point.facts.state)] if given else []

@@ -38,7 +38,8 @@ def told(found: Followed, point: Point) -> bool | None:
 
     None where even a difference of 3e-8 changes the sequence of phases: there is nothing to compare with.
     """
-    motion, (state, period, scales) = found.motion(point.p), found.cycle(point)
+    motion = found.motion(point.p)
+    state, period, scales = found.cycle(point)
     matrix = differences(motion, state, period, scales)
     if matrix is None:
         return None
@@ -56,7 +57,9 @@ def test_multipliers_are_those_of_differences_of_another_scheme(number: int) -> 
     Beside a border, where they change like the square root of the distance, that may be more than 1e-4: such a
     point must agree once it has been corrected until it stands still. One or other lies on the border itself.
     """
-    compared, beside_border, wrong = 0, 0, 0
+    compared = 0
+    beside_border = 0
+    wrong = 0
     for found in branches(101, number):
         for point in spread(found.branch.points[1:]):
             agrees = told(found, point)
@@ -124,10 +127,14 @@ def test_runs_beside_an_unstable_cycle_part_from_it_as_its_multiplier_says(numbe
                 continue
             values, right, left = modes
             k = int(np.argmax(np.abs(values)))
-            growth, along, across = values[k].real, right[:, k].real, left[k].real
+            growth = values[k].real
+            along = right[:, k].real
+            across = left[k].real
             amplitude = cycle_of(point).amplitude
             step = DISPLACED * amplitude / scales[0] * along / np.abs(along).max()
-            word, parts, begins = motion(state, period).word, [], []
+            word = motion(state, period).word
+            parts = []
+            begins = []
             for sign in (1.0, -1.0):
                 begins.append(state + sign * step * scales)
                 after = motion(begins[-1], period)
@@ -158,9 +165,11 @@ def test_runs_beside_a_stable_cycle_return_to_it(number: int) -> None:
         stable = [point for point in found.inner if point.stable and abs(point.multipliers[0]) < 0.97]
         for point in spread(stable, 2):
             state, period, scales = found.cycle(point)
-            motion, chance = found.motion(point.p), np.random.default_rng(1)
+            motion = found.motion(point.p)
+            chance = np.random.default_rng(1)
             size = cycle_of(point).amplitude / scales[0]
-            away, word = size * scales * chance.uniform(-1.0, 1.0, 4), motion(state, 20.0 * period).word
+            away = size * scales * chance.uniform(-1.0, 1.0, 4)
+            word = motion(state, 20.0 * period).word
             sizes = DISPLACED, 1e-4, 1e-5
             near = [part for part in sizes if motion(state + part * away, 20.0 * period).word == word]
             if not near:
@@ -177,14 +186,17 @@ def test_runs_beside_a_stable_cycle_return_to_it(number: int) -> None:
 
 def beside(motion: Phasewise, end: Array, state: Array, period: float, scales: Array) -> float:
     """How far a state lies from a cycle, in scales: from the nearest of its places, by Newton's method in time."""
-    places, here = [], state
+    places = []
+    here = state
     for _ in range(200):
         places.append(here)
         here = motion(here, period / 200.0).end
     here = places[int(np.argmin([np.abs((place - end) / scales).max() for place in places]))]
-    begin, time = here, 0.0
+    begin = here
+    time = 0.0
     for _ in range(6):
-        speed, off = motion.speed(here) / scales, (end - here) / scales
+        speed = motion.speed(here) / scales
+        off = (end - here) / scales
         time += float(speed @ off) / float(speed @ speed)
         time %= period
         here = motion(begin, time).end if time > 0.0 else begin
@@ -199,11 +211,13 @@ def zeros(
     def rate(value: float) -> float:
         return float(Shoe.of(changed(tables, key, value)).modes[0].real)
 
-    values, found = np.linspace(low, high, 400), []
+    values = np.linspace(low, high, 400)
+    found = []
     rates = [rate(float(value)) for value in values]
     for k in range(len(values) - 1):
         if (rates[k] > 0.0) != (rates[k + 1] > 0.0):
-            a, b = float(values[k]), float(values[k + 1])
+            a = float(values[k])
+            b = float(values[k + 1])
             for _ in range(60):
                 middle = 0.5 * (a + b)
                 a, b = (middle, b) if (rate(middle) > 0.0) == (rates[k] > 0.0) else (a, middle)
@@ -224,11 +238,13 @@ def test_steady_sliding_changes_where_the_eigenvalues_of_another_formula_do(numb
     for k, (tables, critical) in enumerate(islice(drawn(304), number)):
         key = (FRICTION, *KEYS)[k % 7]
         if key == FRICTION:
-            low, high = 0.0, 3.0 * critical
+            low = 0.0
+            high = 3.0 * critical
         else:
             tables = changed(tables, FRICTION, critical * chance.uniform(0.9, 1.2))
             table, name = key.split(".")
-            value, (lower, upper) = tables[table].get(name, 0.0), RANGES.get(key, (0.3, 3.0))
+            value = tables[table].get(name, 0.0)
+            lower, upper = RANGES.get(key, (0.3, 3.0))
             low, high = (value + lower, value + upper) if name == "angle_deg" else (value * lower, value * upper)
             if low == high:
                 continue
@@ -266,7 +282,8 @@ def test_both_sheets_meet_at_a_fold_like_a_square_root_and_no_cycle_is_left_beyo
             if sheets is None:
                 continue  # a border or another fold lies nearer
             seen += 1
-            (near, far), side = sheets, math.copysign(1.0, sheets[0][0].p - fold.p)
+            near, far = sheets
+            side = math.copysign(1.0, sheets[0][0].p - fold.p)
             apart_near, apart_far = (np.abs(b.z - a.z).max() for a, b in (near, far))
             assert apart_far == pytest.approx(2.0 * apart_near, rel=0.05)
             gaps = [abs(cycle_of(b).period - cycle_of(a).period) for a, b in (near, far)]

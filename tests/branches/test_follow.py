@@ -79,7 +79,8 @@ def test_ends_of_the_range_are_exact() -> None:
 def test_sign_chooses_the_direction() -> None:
     problem = parabola(0.3)
     first = first_of(problem, [0.5], 0.55)
-    up, down = follow(problem, first, 1.0), follow(problem, first, -1.0)
+    up = follow(problem, first, 1.0)
+    down = follow(problem, first, -1.0)
     assert kinds(up) == ["end"]
     assert kinds(down) == ["fold", "end"]
     assert up.points[1].p > first.p > down.points[1].p

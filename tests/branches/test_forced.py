@@ -85,9 +85,11 @@ def test_motions_close_and_disturbances_grow_as_in_the_event_driven_scheme(many:
         for point in some(branch, 2):
             if stretch(point) > 100.0:
                 continue
-            system, motion = line.system(point.p), point.facts
+            system = line.system(point.p)
+            motion = point.facts
             assert gap(system, motion.state, motion.period) < 1e-4 * stretch(point), (seed, point.p)
-            stable, unstable = stable + point.stable, unstable + (not point.stable)
+            stable = stable + point.stable
+            unstable = unstable + (not point.stable)
             ends = [
                 [
                     event_driven(system, np.array(motion.state) + change, motion.period, 1).rows[-1, :4]
@@ -131,8 +133,10 @@ def test_a_low_wave_forces_the_linear_response_and_its_multipliers_are_those_of_
     assert point.facts.period == pytest.approx(period, rel=1e-14)
     np.testing.assert_allclose(np.sort(np.abs(point.multipliers)), np.sort(np.abs(expected)), rtol=1e-5)
     assert point.stable == (shoe.rate < 0.0)
-    omega, half = 2.0 * math.pi / 0.017, tables["contact"]["half_length"]
-    turning, x = omega * shoe.belt, float(shoe.rest[0])
+    omega = 2.0 * math.pi / 0.017
+    half = tables["contact"]["half_length"]
+    turning = omega * shoe.belt
+    x = float(shoe.rest[0])
     height = 1e-10 * math.sin(omega * half) / (omega * half) * cmath.exp(1j * (omega * x + math.radians(30.0)))
     force = shoe.k * np.array([shoe.phi, 1.0]) * height  # times exp(-i turning t); the imaginary part counts
     response = np.linalg.solve(shoe.stiffness - 1j * turning * shoe.b - shoe.m * turning**2 * np.eye(2), force)
@@ -202,7 +206,8 @@ def test_more_segments_change_nothing() -> None:
     frame = whole.frame
     parts = Forced(line.system, replace(frame, segments=4, steps=frame.steps // 4))
     whole = Forced(line.system, replace(frame, steps=frame.steps // 4 * 4))
-    one, other = whole.grown(0.4), parts.grown(0.4)
+    one = whole.grown(0.4)
+    other = parts.grown(0.4)
     assert one is not None
     assert other is not None
     np.testing.assert_allclose(other.u[:4], one.u, atol=1e-8)

@@ -25,7 +25,12 @@ from tests.examples import make
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
-MASS, LINK, CONTACT, LOAD, HALF, RADIUS = 10.0, 1e6, 1e7, 100.0, 0.005, 0.5
+MASS = 10.0
+LINK = 1e6
+CONTACT = 1e7
+LOAD = 100.0
+HALF = 0.005
+RADIUS = 0.5
 FAST = math.sqrt((LINK + CONTACT) / MASS)  # rad/s, in contact
 DAMPING = 2.0 * 0.03 * FAST * MASS
 DEPTH = LOAD / (LINK + CONTACT)
@@ -57,21 +62,30 @@ class Exact:
 
     def __init__(self, omega: float, phase: float) -> None:
         mean = HEIGHT * math.sin(HALF / RADIUS) / (HALF / RADIUS)  # of the wave over the pad
-        self.omega, self.phase, self.gap = omega, phase, np.array([-1.0, 0.0, mean, 0.0, 0.0])
+        self.omega = omega
+        self.phase = phase
+        self.gap = np.array([-1.0, 0.0, mean, 0.0, 0.0])
         self.generators = {}
         for touches, k in ((True, CONTACT), (False, 0.0)):
             a = np.zeros((5, 5))  # of y, its velocity, sine and cosine of the wave, 1
-            a[0, 1], a[2, 3], a[3, 2] = 1.0, -omega, omega
+            a[0, 1] = 1.0
+            a[2, 3] = -omega
+            a[3, 2] = omega
             a[1] = np.array([-(LINK + k), -DAMPING, k * mean, 0.0, -LOAD]) / MASS
             self.generators[touches] = a
 
     def period(self, y: float, v: float) -> tuple[Array, Array]:
         """y and its velocity after a period of the wave, and their derivative by those before."""
         span = 2.0 * math.pi / self.omega
-        z, total, time = np.array([y, v, math.sin(self.phase), math.cos(self.phase), 1.0]), np.eye(5), 0.0
+        z = np.array([y, v, math.sin(self.phase), math.cos(self.phase), 1.0])
+        total = np.eye(5)
+        time = 0.0
         touches = bool(self.gap @ z > 0.0)
         for _ in range(20):
-            a, gone, part, found = self.generators[touches], 0.0, z, None
+            a = self.generators[touches]
+            gone = 0.0
+            part = z
+            found = None
             while found is None and time + gone < span * (1.0 - 1e-14):
                 step = min(span / LOOKS, span - time - gone)
                 after = expm(a * step) @ part if step < span / LOOKS else self._look(touches) @ part
@@ -79,9 +93,12 @@ class Exact:
                     found = gone + brentq(
                         lambda s, a=a, part=part: self.gap @ expm(a * s) @ part, 0.0, step, xtol=1e-17, rtol=1e-15
                     )
-                part, gone = after, gone + step
+                part = after
+                gone = gone + step
             passed = expm(a * (gone if found is None else found))
-            z, total, time = passed @ z, passed @ total, time + (gone if found is None else found)
+            z = passed @ z
+            total = passed @ total
+            time = time + (gone if found is None else found)
             if found is None:
                 return z[:2], total[:2, :2]
             touches = not touches
@@ -96,7 +113,8 @@ class Exact:
         for _ in range(15):
             end, matrix = self.period(y, v)
             step = np.linalg.solve(np.eye(2) - matrix, end - np.array([y, v]))
-            y, v = y + step[0], v + step[1]
+            y = y + step[0]
+            v = v + step[1]
             if abs(step[0]) < 1e-12 * DEPTH:
                 break
         return y, v, self.period(y, v)[1]

@@ -29,7 +29,8 @@ def test_interpolated_numbers_are_those_of_the_case_to_rounding(key: str) -> Non
     assert line._table is not None
     largest = np.abs(line._table).max(axis=0)
     for p in [*np.random.default_rng(3).uniform(0.0, 1.0, 40), 0.0, 1.0]:
-        shoe, exact = line.shoe(float(p)), Shoe.of(line.system(float(p)))
+        shoe = line.shoe(float(p))
+        exact = Shoe.of(line.system(float(p)))
         off = np.array([*shoe.coefficients, *shoe[1:]]) - np.array([*exact.coefficients, *exact[1:]])
         assert np.all(np.abs(off) <= 2e-13 * largest)
 
@@ -47,14 +48,16 @@ def test_the_ends_are_exact_and_ties_take_the_same_value() -> None:
 def test_steady_sliding_of_the_numbers_is_that_of_the_system() -> None:
     line = Line(make(SQUEAL), ["friction.coefficient"], 0.0, 2.0)
     for p in (0.0, 0.3, 0.9):
-        rest, exact = line.shoe(p).rest, steady_sliding(line.system(p))
+        rest = line.shoe(p).rest
+        exact = steady_sliding(line.system(p))
         assert rest == pytest.approx((exact.x, exact.y), rel=1e-12)
 
 
 def test_a_locked_shoe_has_no_steady_sliding() -> None:
     """From φ = (cxx (cyy + K) - cxy²) / (cxy K) on, where the determinant of its stiffness vanishes."""
     line = Line(make(SQUEAL, wheel__angular_speed=-1.0), ["friction.coefficient"], 0.0, 100.0)
-    c, k = line.shoe(0.0).coefficients, line.shoe(0.0).stiffness
+    c = line.shoe(0.0).coefficients
+    k = line.shoe(0.0).stiffness
     locks = (c.c_xx * (c.c_yy + k) - c.c_xy**2) / abs(c.c_xy * k)
     assert locks < 100.0
     side = 1.0 if c.c_xy > 0.0 else -1.0

@@ -9,7 +9,8 @@ from brakecli.branches.multipliers import product, resonant_pair, spectrum
 
 
 def rotation(angle: float, size: float) -> list[list[float]]:
-    c, s = size * math.cos(angle), size * math.sin(angle)
+    c = size * math.cos(angle)
+    s = size * math.sin(angle)
     return [[c, -s], [s, c]]
 
 
@@ -28,7 +29,8 @@ def test_tests_are_the_determinants() -> None:
 
 
 def test_the_first_map_acts_first() -> None:
-    a, b = np.array([[1.0, 2.0], [0.0, 1.0]]), np.array([[0.5, 0.0], [1.0, 3.0]])
+    a = np.array([[1.0, 2.0], [0.0, 1.0]])
+    b = np.array([[0.5, 0.0], [1.0, 3.0]])
     total, log = product(np.array([a, b]))
     assert total * math.exp(log) == pytest.approx(b @ a)
 

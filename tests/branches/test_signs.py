@@ -77,7 +77,8 @@ def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
 
 
 def test_the_logistic_map_doubles_at_3_and_at_1_plus_the_root_of_6() -> None:
-    once, twice = Orbits(logistic, 2.5, 4.0), Orbits(logistic, 2.5, 4.0, 2)
+    once = Orbits(logistic, 2.5, 4.0)
+    twice = Orbits(logistic, 2.5, 4.0, 2)
     (flip,) = located(both_ways(once, first_of(once, [0.6], 0.0)), "flip")
     assert once.value(flip.p) == pytest.approx(3.0, abs=1e-8)
     doubled = switch(twice, flip.point)
@@ -106,7 +107,8 @@ def test_the_henon_map_folds_and_doubles_as_its_closed_forms_say() -> None:
         until=lambda point: "too large" if abs(point.u[0]) > 20.0 else None,
     )
     assert branch.ended[0] == ("stopped", "too large")  # the second fixed point goes to infinity as a goes to 0
-    (fold,), (flip,) = located(branch, "fold"), located(branch, "flip")
+    (fold,) = located(branch, "fold")
+    (flip,) = located(branch, "flip")
     assert problem.value(fold.p) == pytest.approx(-((1.0 - b) ** 2) / 4.0, abs=1e-8)
     assert problem.value(flip.p) == pytest.approx(3.0 * (1.0 - b) ** 2 / 4.0, abs=1e-8)
     twice = Orbits(henon(b), -0.2, 1.4, 2)

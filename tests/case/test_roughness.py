@@ -357,7 +357,8 @@ AXES: dict[str, list[Any]] = {
 
 @pytest.mark.parametrize("key", AXES)
 def test_a_point_of_a_sweep_has_the_surface_of_its_own_case(tmp_path: Path, key: str) -> None:
-    path, values = profiled(tmp_path), AXES[key]
+    path = profiled(tmp_path)
+    values = AXES[key]
     text = tomli_w.dumps({"case": "case.toml", "axis": [{"parameter": key, "values": values}]})
     plan = pickle.loads(pickle.dumps(parse_sweep(text, "sweep.toml", tmp_path).plan))
     for point, value in enumerate(values):
@@ -377,8 +378,10 @@ def test_a_sweep_of_other_keys_needs_no_file_of_a_profile(tmp_path: Path) -> Non
 def test_a_profile_that_was_changed_is_read_again_and_ends_a_continuation(tmp_path: Path) -> None:
     path = profiled(tmp_path)
     text = "case = 'case.toml'\n[[axis]]\nparameter = 'wheel.radius'\nvalues = [0.5, 0.6]\n"
-    plan, before = parse_sweep(text, "sweep.toml", tmp_path).plan, parse_case(*read_text(str(path))).resolved
-    was, surfaces = identity(plan), [plan.case(plan.settings(point)) for point in range(2)]
+    plan = parse_sweep(text, "sweep.toml", tmp_path).plan
+    before = parse_case(*read_text(str(path))).resolved
+    was = identity(plan)
+    surfaces = [plan.case(plan.settings(point)) for point in range(2)]
     saved(tmp_path / "runout.csv", "s_m,h_um", RADIUS * np.radians(ANGLES), 2.0 * RUNOUT)
     assert parse_case(*read_text(str(path))).resolved != before
     assert identity(plan) == was

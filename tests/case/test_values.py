@@ -11,7 +11,10 @@ from tests.case.examples import CONSTANT, EVENT_DRIVEN, VARYING, messages, probl
 VALUES = ("nan", "inf", "-1", "0", "1e999", "1e-320", '"text"', "true", "2020-01-01", "[1, 2]")
 """What is put into every field, as TOML."""
 
-NUMBER, NON_NEGATIVE, POSITIVE, LIST = {"-1", "0"}, {"0"}, set[str](), {"[1, 2]"}
+NUMBER = {"-1", "0"}
+NON_NEGATIVE = {"0"}
+POSITIVE = set[str]()
+LIST = {"[1, 2]"}
 ROUGHNESS = {"amplitudes": NUMBER, "wavelengths": POSITIVE, "wavenumbers": POSITIVE, "phases_deg": NUMBER}
 SURFACES = [f"roughness.{side}" for side in ("shoe", "wheel")]
 ALLOWED_IN_LIST = {

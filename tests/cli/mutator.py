@@ -174,7 +174,8 @@ def mutated(text: str, chance: random.Random) -> bytes:
 
 def with_another_header(data: bytes, chance: random.Random) -> bytes:
     """A result without its digest in which one to three bytes or lengths of an object's header were changed."""
-    changed, headers = bytearray(data), _headers(data)
+    changed = bytearray(data)
+    headers = _headers(data)
     for _ in range(chance.choice((1, 1, 2, 3))):
         start, first, end = chance.choice(headers)
         place = chance.randrange(first, end)
@@ -190,7 +191,8 @@ def _headers(data: bytes) -> list[tuple[int, int, int]]:
     """Where object headers begin, where their messages do, and where these end and the checksum stands."""
     found = []
     for match in re.finditer(b"OHDR", data):
-        start, flags = match.start(), data[match.start() + 5]
+        start = match.start()
+        flags = data[match.start() + 5]
         size_at = start + 6 + 16 * bool(flags & 0x20) + 4 * bool(flags & 0x10)
         first = size_at + (1 << (flags & 3))
         end = first + int.from_bytes(data[size_at:first], "little")
@@ -212,11 +214,14 @@ def _lookup3(data: bytes) -> int:
         state = [(state[n] + int.from_bytes(block[4 * n : 4 * n + 4], "little")) & 0xFFFFFFFF for n in range(3)]
         if start + 12 < len(data):
             for n, by in enumerate((4, 6, 8, 16, 19, 4)):
-                one, other, third = n % 3, (n + 2) % 3, (n + 1) % 3
+                one = n % 3
+                other = (n + 2) % 3
+                third = (n + 1) % 3
                 state[one] = (state[one] - state[other]) & 0xFFFFFFFF ^ turn(state[other], by)
                 state[other] = (state[other] + state[third]) & 0xFFFFFFFF
         else:
             for n, by in enumerate((14, 11, 25, 16, 4, 14, 24)):
-                one, other = (n + 2) % 3, (n + 1) % 3
+                one = (n + 2) % 3
+                other = (n + 1) % 3
                 state[one] = ((state[one] ^ state[other]) - turn(state[other], by)) & 0xFFFFFFFF
     return state[2]

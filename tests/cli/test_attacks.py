@@ -60,7 +60,8 @@ def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
     for name in ("stdout", "stderr", "argv"):  # are restored at the end
         monkeypatch.setattr(sys, name, getattr(sys, name))
     guard_streams()
-    chance, codes = random.Random(number), list[object]()
+    chance = random.Random(number)
+    codes = list[object]()
     texts = (TINY, starters()["case"], starters()["case"] + ROUGH, SWEEP)
     for n in range(number):
         name = f"{n}.toml"  # pipes are read once, and so is each name
@@ -88,7 +89,9 @@ def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
 def test_a_result_with_another_header_is_refused_with_a_sentence_or_used(
     number: int, good: Path, tmp_path: Path
 ) -> None:
-    whole, chance, refused = (good / "tiny.h5").read_bytes()[:-32], random.Random(number), 0
+    whole = (good / "tiny.h5").read_bytes()[:-32]
+    chance = random.Random(number)
+    refused = 0
     for _ in range(number):
         (tmp_path / "f.h5").write_bytes(with_another_header(whole, chance))
         words = chance.choice((["classify"], ["classify", "--json"], ["run", "-o", "o.h5", "--force", "-q"]))
@@ -123,7 +126,8 @@ def test_odd_names_and_titles_reach_no_terminal(tmp_path: Path) -> None:
 def test_what_stands_in_the_way_of_an_output_is_named_and_left_alone(
     kind: str, ending: str, tmp_path: Path
 ) -> None:
-    place, other = tmp_path / f".case.toml{ending}", tmp_path / "other"
+    place = tmp_path / f".case.toml{ending}"
+    other = tmp_path / "other"
     other.write_text("mine")
     match kind:
         case "pipe":
@@ -165,7 +169,8 @@ def test_every_limit_of_the_address_space_that_is_too_small_is_told(here: Path) 
 
 @campaign
 def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
-    chance, cache = random.Random(17), here / "cache"
+    chance = random.Random(17)
+    cache = here / "cache"
     brakecli("check", "tiny.toml", cwd=here, stdin="", XDG_CACHE_HOME=str(cache)).told(0)
     files = sorted(cache.rglob("*.nb?"))
     assert files

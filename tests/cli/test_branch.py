@@ -113,7 +113,7 @@ def test_steady_sliding_is_full_up_to_its_flutter_and_dashed_beyond(here: Path, 
     assert upper.get_ylabel() == "amplitude of x (µm)"
     assert of_part.get_ylabel() == "stick fraction"
     lines: list[Any] = [each for each in lower.get_lines() if each.get_color() == DARK]
-    (full, dashed) = [each for each in lines if len(each.get_xdata()) > 1]
+    full, dashed = [each for each in lines if len(each.get_xdata()) > 1]
     assert (full.get_linestyle(), dashed.get_linestyle()) == ("-", "--")
     assert full.get_xdata()[-1] == dashed.get_xdata()[0] == found["critical"]
     assert dashed.get_xdata()[-1] == 1.0
@@ -164,7 +164,8 @@ def test_the_function_gives_the_same_branches(here: Path, found: dict[str, Any])
 
 
 def test_functions_take_a_number_of_pushes(here: Path) -> None:
-    case, along = here / "branch.toml", cast(Any, {"friction.coefficient": (0.0, 1.0)})
+    case = here / "branch.toml"
+    along = cast(Any, {"friction.coefficient": (0.0, 1.0)})
     assert brakecli.branch(case, parameter=along, pushes=3).attrs["pushes"] == 15
     assert int(brakecli.stability(case, pushes=0).pushes) == 0
     wrong: Any
@@ -335,7 +336,8 @@ def test_a_shoe_that_locks_is_said_to_lock(here: Path) -> None:
 
     tables = tomllib.loads((here / "branch.toml").read_text())
     tables["wheel"]["angular_speed"] *= -1.0
-    c, k = Shoe.of(tables).c, Shoe.of(tables).k
+    c = Shoe.of(tables).c
+    k = Shoe.of(tables).k
     locks = abs((c[0, 0] * (c[1, 1] + k) - c[0, 1] ** 2) / (k * c[0, 1]))
     words = ("--parameter", f"friction.coefficient=0:{1.2 * locks}")
     side = "-0.025" if c[0, 1] < 0.0 else "0.025"

@@ -65,7 +65,8 @@ def test_the_frequency_of_a_run_that_has_not_settled_says_so(here: Path, tmp_pat
 
 def test_a_rough_wheel_is_asked_whether_neighbours_come_together(here: Path) -> None:
     """A forced motion in full contact is linear: they fade as its slowest mode does, by its eigenvalue."""
-    rough, smooth = ROOT / "cases" / "rough-full-contact.toml", RELAXATION
+    rough = ROOT / "cases" / "rough-full-contact.toml"
+    smooth = RELAXATION
     said, told, again, listed, none = each(
         here,
         [

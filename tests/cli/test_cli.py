@@ -238,7 +238,8 @@ def test_a_directory_is_not_a_result_to_draw(tmp_path: Path) -> None:
 
 
 def test_the_schema_is_the_shipped_file(tmp_path: Path) -> None:
-    done, ascii_only = brakecli("schema", cwd=tmp_path), brakecli("schema", cwd=tmp_path, PYTHONIOENCODING="ascii")
+    done = brakecli("schema", cwd=tmp_path)
+    ascii_only = brakecli("schema", cwd=tmp_path, PYTHONIOENCODING="ascii")
     shipped = resources.files("brakecli.case").joinpath("case.schema.json").read_text(encoding="utf-8")
     assert done.told(0) == ascii_only.told(0) == ""
     assert done.json == ascii_only.json == json.loads(shipped)

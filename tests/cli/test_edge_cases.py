@@ -51,7 +51,7 @@ def test_a_reversed_wheel_of_a_symmetric_case_mirrors_the_motion(here: Path) -> 
 def test_an_explicit_scheme_beyond_its_step_is_refused_with_the_limit_which_then_holds(here: Path) -> None:
     weights = "solver.theta=[0.0, 0.0]"
     coarse = ["solver.step=1e-3", "output.sample_interval=1e-3", "solver.duration=0.1"]
-    (two_layer, three_layer) = variants(
+    two_layer, three_layer = variants(
         here,
         [weights, *coarse],
         [
@@ -104,7 +104,8 @@ def test_steps_that_do_not_converge_end_the_run_unless_allowed_and_are_kept(here
     allowed.told(1, "the motion grew beyond all bounds")
     for name, steps in (("0.h5", 1), ("1.h5", count)):
         with h5py.File(here / name) as file:
-            residuals, times = file["unconverged/residual"], file["unconverged/time"]
+            residuals = file["unconverged/residual"]
+            times = file["unconverged/time"]
             assert residuals.shape == times.shape == (steps,)
             assert residuals.attrs["units"] == "N"
             assert np.all(np.abs(residuals[:]) > 0.0)

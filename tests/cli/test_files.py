@@ -393,7 +393,8 @@ def test_samples_are_compared_at_the_same_time_and_lines_at_the_same_frequency(
     folder: Path, tmp_path: Path, interval: str
 ) -> None:
     change = ["--set", f"output.sample_interval={interval}", "--set", "solver.duration=0.45"]
-    coarse, fine = tmp_path / "coarse.h5", folder / "a.h5"
+    coarse = tmp_path / "coarse.h5"
+    fine = folder / "a.h5"
     brakecli("run", "tiny.toml", "-q", "-o", coarse, *change, cwd=folder).told(0)
     for names, swap in (((fine, coarse), 1), ((coarse, fine), -1)):
         found = brakecli("diff", *names, "--json", cwd=folder).json

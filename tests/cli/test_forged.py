@@ -72,7 +72,8 @@ def test_a_forged_result_is_refused_with_a_sentence_or_used(
     results: Path, tmp_path: Path, number: int, spared: float
 ) -> None:
     """`spared`: part of the pictures, which take long, that are replaced by a verdict."""
-    chance, found = random.Random(number), 0
+    chance = random.Random(number)
+    found = 0
     for _ in range(number):
         kind = chance.choice(("run", "run", "run", "run", "sweep", "comparison", "stability"))
         shutil.copy(results / f"{kind}.h5", tmp_path / "f.h5")
@@ -94,19 +95,17 @@ def test_what_other_programs_have_added_does_no_harm(results: Path, tmp_path: Pa
     shutil.copy(results / "run.h5", tmp_path / "f.h5")
     with h5py.File(tmp_path / "f.h5", "r+") as file:
         for place in (file, file["history"], file["history/x"]):
-            place.attrs["note"], place.attrs["bytes"], place.attrs["of"] = (
-                "ü",
-                np.bytes_(b"\xff"),
-                np.arange(6.0).reshape(2, 3),
-            )
-            place.attrs["flag"], place.attrs["empty"], place.attrs["link"] = (
-                True,
-                h5py.Empty("f8"),
-                file["history"].ref,
-            )
-        file["history/own"], file["history/one"] = np.arange(3), 1.0
+            place.attrs["note"] = "ü"
+            place.attrs["bytes"] = np.bytes_(b"\xff")
+            place.attrs["of"] = np.arange(6.0).reshape(2, 3)
+            place.attrs["flag"] = True
+            place.attrs["empty"] = h5py.Empty("f8")
+            place.attrs["link"] = file["history"].ref
+        file["history/own"] = np.arange(3)
+        file["history/one"] = 1.0
         file.create_dataset("history/large", (10**9,), "f8", chunks=(1000,))
-        file["history/elsewhere"], file["more/x"] = h5py.SoftLink("/nowhere"), [b"a"]
+        file["history/elsewhere"] = h5py.SoftLink("/nowhere")
+        file["more/x"] = [b"a"]
         file.attrs["tool_version"] = [1, 2]
     for command in [*COMMANDS["run"], ["diff", str(results / "run.h5"), "--json"]]:
         tried(tmp_path, "f.h5", command).told(0)

@@ -32,8 +32,10 @@ def shoe(chance: random.Random) -> dict[str, object]:
     def between(low: float, high: float) -> float:
         return math.exp(chance.uniform(math.log(low), math.log(high)))
 
-    mass, first = between(0.1, 50.0), between(20.0, 2000.0)
-    stiffness, half = mass * (2.0 * math.pi * first) ** 2, between(1e-3, 0.1)
+    mass = between(0.1, 50.0)
+    first = between(20.0, 2000.0)
+    stiffness = mass * (2.0 * math.pi * first) ** 2
+    half = between(1e-3, 0.1)
     damping = between(1e-4, 0.05) * math.sqrt(stiffness * mass)
     load = between(0.1, 1e4)
     return {
@@ -59,7 +61,8 @@ def shoe(chance: random.Random) -> dict[str, object]:
 
 def rough(case: dict[str, object], chance: random.Random) -> None:
     """Waves of the wheel, flat enough to roll over or so high that the shoe flies."""
-    count, height = chance.randrange(1, 4), 10.0 ** chance.uniform(-7.0, -4.0)
+    count = chance.randrange(1, 4)
+    height = 10.0 ** chance.uniform(-7.0, -4.0)
     case["roughness.wheel.amplitudes"] = [height * chance.random() for _ in range(count)]
     case["roughness.wheel.wavelengths"] = [chance.uniform(0.005, 0.05) for _ in range(count)]
     case["solver.duration"] = 0.2 * float(str(case["solver.duration"]))
@@ -68,7 +71,8 @@ def rough(case: dict[str, object], chance: random.Random) -> None:
 
 def stop(case: dict[str, object], chance: random.Random) -> None:
     """Speed or load over time, to rest, through rest, or away from the wheel."""
-    seconds, count = float(str(case["solver.duration"])), chance.randrange(2, 5)
+    seconds = float(str(case["solver.duration"]))
+    count = chance.randrange(2, 5)
     times = sorted(chance.uniform(0.0, 1.2) * seconds for _ in range(count))
     key, values = chance.choice((("wheel.angular_speed", "wheel.angular_speeds"), ("load.force", "load.forces")))
     first = float(str(case.pop(key)))
@@ -85,7 +89,8 @@ def stepped(case: dict[str, object], chance: random.Random) -> None:
 
 def by_itself(case: dict[str, object], chance: random.Random) -> None:
     """As long as it takes, within few steps."""
-    case["solver.duration"], case["solver.budget"] = "settled", 20_000
+    case["solver.duration"] = "settled"
+    case["solver.budget"] = 20_000
 
 
 def with_events(case: dict[str, object], chance: random.Random) -> None:
@@ -128,7 +133,8 @@ def written(folder: Path, chance: random.Random) -> str:
     case = shoe(chance)
     if chance.random() < OF_RUNS:
         changes = chance.choice(RUNS)
-        kind, words = " ".join(each.__name__ for each in changes) or "run", ["run", "c.toml"]
+        kind = " ".join(each.__name__ for each in changes) or "run"
+        words = ["run", "c.toml"]
         for each in changes:
             each(case, chance)
     else:
@@ -181,7 +187,8 @@ def without_advice(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("without_advice")
 @pytest.mark.parametrize("number", counts(25, 100, 600))
 def test_every_reader_reads_what_was_written(tmp_path: Path, number: int) -> None:
-    chance, read = random.Random(number), 0
+    chance = random.Random(number)
+    read = 0
     for place in range(number):
         what = written(tmp_path, chance)
         if (tmp_path / "r.h5").exists():

@@ -92,7 +92,9 @@ def test_no_control_character_of_a_file_a_name_or_a_title_reaches_the_terminal(g
     (tmp_path / f"{ODD}.h5").write_bytes((good / "tiny.h5").read_bytes()[:-32])
     with h5py.File(tmp_path / f"{ODD}.h5", "r+") as file:
         text = file.attrs["resolved_toml"].replace('title = "Tiny"', r'title = "\u202Ex"')
-        file.attrs["resolved_toml"], file.attrs["failure"], file.attrs["kind"] = text, ODD, "run"
+        file.attrs["resolved_toml"] = text
+        file.attrs["failure"] = ODD
+        file.attrs["kind"] = "run"
     signal = ["classify", f"{ODD}.csv", "--quantity", "force", "--sample-rate", "1"]
     lines = [
         *(["check", f"{ODD}.toml"], ["run", f"{ODD}.toml", "--set", 'title="\\u202Ex"'], ["run", f"{ODD}.toml"]),

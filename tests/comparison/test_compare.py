@@ -105,7 +105,8 @@ def test_forces_have_errors_of_their_own_that_do_not_enter_the_error() -> None:
 
 @pytest.mark.parametrize(("factor", "shift"), [(1.0, 0.0), (1.1, 0.0), (0.9, 0.3), (1.0, -0.2)])
 def test_amplitude_and_phase_are_those_of_the_settled_line(factor: float, shift: float) -> None:
-    reference, count = history(64 * 40), 64 * 40
+    reference = history(64 * 40)
+    count = 64 * 40
     rows = reference.copy()
     wave = factor * np.sin(2.0 * np.pi * np.arange(count) / 64.0 + shift)
     rows[:, COLUMNS["vx"]] = wave * (1.0 + COLUMNS["vx"])
@@ -199,7 +200,8 @@ def test_steps_that_make_no_ladder_are_refused(text: str) -> None:
 
 
 def test_observed_orders_are_those_that_the_schemes_declare() -> None:
-    found, checked = smooth_comparison(), 0
+    found = smooth_comparison()
+    checked = 0
     for method in dict.fromkeys(entry.kind for entry in found.entries):
         if method.own_steps:
             continue
@@ -256,7 +258,8 @@ def test_the_bias_of_weights_of_one_is_as_published() -> None:
 
 
 def test_on_rough_surfaces_the_bias_is_that_of_stability_too() -> None:
-    path, solver = str(ROOT / "cases" / "accuracy" / "C.toml"), ["solver.theta=[1.0, 1.0]", "solver.duration=1e-3"]
+    path = str(ROOT / "cases" / "accuracy" / "C.toml")
+    solver = ["solver.theta=[1.0, 1.0]", "solver.duration=1e-3"]
     case = parse_case(*read_text(path), [*solver, "solver.step=2e-5", "output.sample_interval=2e-5"]).case
     found = compare(system_of(case), schemes=["two-layer"], steps=[2e-5], budget=1.0)
     (entry,) = entries_of(found, "two-layer", (1.0, 1.0))
@@ -295,7 +298,8 @@ def test_no_entry_beats_one_of_the_front_and_each_other_is_beaten() -> None:
 def beats(one: Entry, other: Entry) -> bool:
     assert one.errors is not None
     assert other.errors is not None
-    first, second = (one.wall_seconds, one.errors.error), (other.wall_seconds, other.errors.error)
+    first = (one.wall_seconds, one.errors.error)
+    second = (other.wall_seconds, other.errors.error)
     return first[0] <= second[0] and first[1] <= second[1] and first != second  # type: ignore[operator]
 
 
@@ -327,7 +331,8 @@ def test_an_error_that_is_low_by_chance_is_told() -> None:
 
 @pytest.mark.parametrize("base", [SQUEAL, ROUGH], ids=["smooth", "rough"])
 def test_the_keys_of_a_method_make_a_case_that_is_solved_by_it(base: dict[str, Any]) -> None:
-    text, system = tomli_w.dumps(base), system_of(make(base))
+    text = tomli_w.dumps(base)
+    system = system_of(make(base))
     for kind in kinds(system):
         method = rungs(kind, ladder(system))[0]
         keys = [f"{key}={json.dumps(value)}" for key, value in in_a_case(method, 1e-4, system.interval).items()]

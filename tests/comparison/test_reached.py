@@ -30,7 +30,9 @@ def test_a_program_that_was_not_there_is_named_once() -> None:
 
 
 def test_many_small_losses_do_not_add_up() -> None:
-    kept, now, failures = OLD, OLD, 0
+    kept = OLD
+    now = OLD
+    failures = 0
     for _ in range(3):
         now = {name: 0.9 * value for name, value in now.items()}
         failures += bool(reached.fallen(kept, now))

@@ -85,10 +85,12 @@ def _attribute(node: Any, chance: random.Random) -> str:
 
 def _node(file: h5py.File, name: str, chance: random.Random) -> str:
     """Put something else in the place of a group or a variable."""
-    node, length = file[name], 5
+    node = file[name]
+    length = 5
     kept = dict(node.attrs) if chance.random() < 0.5 else {}
     if isinstance(node, h5py.Dataset) and node.ndim and node.size <= MOST:  # unless a change has made it huge
-        values, length = node[()], node.shape[0]
+        values = node[()]
+        length = node.shape[0]
         if values.dtype.kind == "f" and chance.random() < 0.4:
             bad = chance.choice((np.nan, np.inf, 1e308, -1e308, 0.0, 5e-324, 1e200, -1.0))
             node[chance.choice((slice(None), slice(0, 1), slice(-1, None), slice(None, None, 2)))] = bad

@@ -36,7 +36,8 @@ def damaged(path: Path) -> None:
     refused = 0  # the rest were read, and exactly: zeros written over zeros do no damage
     for rows in (100, ROWS):
         write(path, rows)
-        good, expected = path.read_bytes(), read_all(path)
+        good = path.read_bytes()
+        expected = read_all(path)
         chance = random.Random(rows)
         variants = [mutate(good, chance) for _ in range(600)]
         variants += [good[: len(good) * part // 50] for part in range(50)]

@@ -292,7 +292,8 @@ def test_without_file_locks_the_process_named_in_the_lock_decides(
 @pytest.mark.parametrize("name", [".r.h5.lock", ".r.h5.part"])
 @pytest.mark.parametrize("kind", ["text", "pipe", "directory", "link", "dangling", "second name"])
 def test_what_this_program_has_not_written_is_named_and_left_alone(tmp_path: Path, name: str, kind: str) -> None:
-    precious, place = tmp_path / "precious", tmp_path / name
+    precious = tmp_path / "precious"
+    place = tmp_path / name
     precious.write_text("kept")
     make: dict[str, Callable[[], object]] = {
         "text": lambda: place.write_text("kept"),

@@ -10,7 +10,8 @@ from brakecli.files.stability_fields import SCATTER
 from brakecli.front.render import TERMINAL, text_of
 from brakecli.reports.blocks import PAGE
 
-FLAG, SHARE = integer("settled", "whether it has settled (0, 1)"), ratio("stick", "part of the time in stick")
+FLAG = integer("settled", "whether it has settled (0, 1)")
+SHARE = ratio("stick", "part of the time in stick")
 LENGTH = Field("amplitude", "m", "amplitude of x")
 
 

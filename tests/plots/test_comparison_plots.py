@@ -45,7 +45,8 @@ Columns = dict[str, NDArray[Any]]
 def columns() -> Columns:
     """Every column that is drawn: a method costs and errs a little more than the one before it."""
     count = len(METHODS) * RUNGS
-    place, rung = np.arange(count) // RUNGS, np.arange(count) % RUNGS
+    place = np.arange(count) // RUNGS
+    rung = np.arange(count) % RUNGS
     own = place == len(METHODS) - 1
     texts = np.array([(label, *kind[:5]) for label, kind in METHODS.items()])[place].T
     found: Columns = dict(
@@ -89,7 +90,8 @@ def test_each_suffix_gives_a_whole_picture_and_the_same_bytes_again(suffix: str,
 
 
 def test_curves_are_the_numbers_of_the_file_in_both_panels(tmp_path: Path) -> None:
-    values, figure = columns(), drawn(write(tmp_path / "r.h5"))
+    values = columns()
+    figure = drawn(write(tmp_path / "r.h5"))
     checked = 0
     for axes, name, factor in zip(figure.axes, ("wall_seconds", "contact_evaluations"), (1e3, 1.0), strict=True):
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
@@ -118,7 +120,8 @@ def test_every_method_has_a_look_of_its_own(tmp_path: Path) -> None:
 
 
 def test_front_target_and_recommendation_are_marked(tmp_path: Path) -> None:
-    values, figure = columns(), drawn(write(tmp_path / "r.h5"))
+    values = columns()
+    figure = drawn(write(tmp_path / "r.h5"))
     left, right = figure.axes
     front = line(left, "no other is better in both")
     np.testing.assert_allclose(front.get_xdata(), 1e3 * values["wall_seconds"][:RUNGS], rtol=1e-12)
@@ -143,7 +146,8 @@ def test_the_legend_covers_no_panel(tmp_path: Path) -> None:
 
 def test_what_is_missing_or_no_result_any_more_leaves_a_gap(tmp_path: Path) -> None:
     values = columns()
-    values["error"][0], values["error"][1] = np.nan, 1e80
+    values["error"][0] = np.nan
+    values["error"][1] = 1e80
     values["failure"] = np.where(np.arange(len(values["error"])) == 0, "diverged", "")
     figure = drawn(write(tmp_path / "r.h5", values, left_out=0))
     for axes in figure.axes:

@@ -125,7 +125,8 @@ def test_both_ways_are_curves_of_their_own_and_their_difference_is_shaded(tmp_pa
 
 def test_a_long_legend_takes_more_rows_and_stays_inside_the_figure(tmp_path: Path) -> None:
     values = columns((2, 8), critical=False)
-    values["status"][:, 5], values["excitation"][:, 2] = "failed", "forced"
+    values["status"][:, 5] = "failed"
+    values["excitation"][:, 2] = "forced"
     table = {"axis": [{**ANGLE, "direction": "both"}]}
     figure = drawn(write(tmp_path / "r.h5", table, {**values, "hysteresis": np.arange(8) % 2}))
     with applied():

@@ -150,6 +150,6 @@ def test_critical_values_of_listed_points_are_the_colours_of_dots(tmp_path: Path
     search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n'
     made = [{"critical_status": "found", "critical": value} for value in (0.3, 0.5)]
     made += [{"critical_status": "stable throughout", "critical": np.nan}]
-    (axes, _) = listed(tmp_path, "shoe.mass, link2.angle_deg\n1, 30\n2, 20\n3, 25\n", made, search).axes
+    axes, _ = listed(tmp_path, "shoe.mass, link2.angle_deg\n1, 30\n2, 20\n3, 25\n", made, search).axes
     assert dots(axes) == {(1.0, 30.0): 0.3, (2.0, 20.0): 0.5}
     np.testing.assert_array_equal(points(axes, "stable up to 2"), [[3.0, 25.0]])

@@ -138,7 +138,8 @@ def test_stick_is_shaded_half_an_interval_around_each_of_its_samples(tmp_path: P
     ]
     assert len(shades) == 1
     spans = [(path.vertices[:, 0].min(), path.vertices[:, 0].max()) for path in shades[0].get_paths()]  # type: ignore[index, union-attr]
-    time, stick = picture.detail["time"], picture.detail["state"] == ContactState.STICK
+    time = picture.detail["time"]
+    stick = picture.detail["state"] == ContactState.STICK
     assert stick.any()
     inside = [any(low < moment < high for low, high in spans) for moment in time]
     np.testing.assert_array_equal(inside, stick)

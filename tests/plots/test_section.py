@@ -59,7 +59,8 @@ def test_a_motion_that_repeats_is_one_dot_on_its_curve(
     with open_result(runs[name]) as result:
         seconds = result.read("history", "time")[-1] - result.attributes["settled_from"]
     for axes in section(runs[name], kind):
-        dots, curve = points(axes, "section"), points(axes, "motion")
+        dots = points(axes, "section")
+        curve = points(axes, "motion")
         assert len(dots) == pytest.approx(count * seconds, abs=1.5)
         assert (np.ptp(dots[-10:], axis=0) < 2e-3 * np.ptp(curve, axis=0)).all()
         sizes = np.ptp(curve, axis=0)
@@ -72,7 +73,8 @@ def test_the_states_at_the_waves_are_those_between_the_samples(runs: dict[str, P
         turns = 2.0 * np.pi * FREQUENCY * result.read("history", "time")[-1000:]
     basis = np.column_stack([np.cos(turns), np.sin(turns), np.ones_like(turns)])
     for axes in section(runs["forced"], "wave"):
-        curve, dot = points(axes, "motion")[-1000:], points(axes, "section")[-1]
+        curve = points(axes, "motion")[-1000:]
+        dot = points(axes, "section")[-1]
         (cosines, _, means), *_ = np.linalg.lstsq(basis, curve, rcond=None)
         assert (np.abs(dot - cosines - means) < 1e-4 * np.ptp(curve, axis=0)).all()
 

@@ -37,7 +37,8 @@ def test_the_spectrogram_has_the_waves_both_modes_and_the_vibration(stop: Path) 
     [mesh] = [each for each in axes.collections if hasattr(each, "get_coordinates")]
     levels = np.asarray(mesh.get_array())
     with h5py.File(stop) as file:
-        density, amplitude = file["spectrogram/vx"][:], file["over_time/amplitude"][:]
+        density = file["spectrogram/vx"][:]
+        amplitude = file["over_time/amplitude"][:]
     assert levels.shape == density.T.shape
     assert levels.max() == 0.0
     where = np.unravel_index(np.argmax(levels), levels.shape)

@@ -259,9 +259,12 @@ def test_the_line_of_critical_friction_is_the_closed_form(tmp_path: Path) -> Non
     friction = {"parameter": "friction.coefficient", "start": 0.0, "stop": 2.0, "num": 5}
     stiffness = {"parameter": "link2.stiffness", "values": [1.15e7, 1.2e7, 1.25e7]}
     result = write(tmp_path / "r.h5", {"axis": [friction, stiffness]}, resolved_toml=resolved)
-    k, c1, angle = 2e6, 1e7, np.radians(5.0)
+    k = 2e6
+    c1 = 1e7
+    angle = np.radians(5.0)
     c2 = np.array(stiffness["values"])
-    cxy, difference = c2 * np.sin(angle) * np.cos(angle), c2 * np.cos(2.0 * angle) - c1 - k
+    cxy = c2 * np.sin(angle) * np.cos(angle)
+    difference = c2 * np.cos(2.0 * angle) - c1 - k
     expected = cxy / k + difference**2 / (4.0 * cxy * k)
     (line,) = [each for each in drawn(result).axes[0].collections if isinstance(each, ContourSet)]
     points = np.concatenate([path.vertices for path in line.get_paths()])

@@ -18,7 +18,10 @@ class Browser:
     """A page of a browser; `events` collects what it has reported."""
 
     def __init__(self, reads: int, writes: int) -> None:
-        self.reads, self.writes, self.rest, self.count = reads, writes, b"", 0
+        self.reads = reads
+        self.writes = writes
+        self.rest = b""
+        self.count = 0
         self.events: list[dict[str, Any]] = []
         self.session = ""
         target = self.call("Target.createTarget", url="about:blank")["targetId"]
@@ -72,7 +75,8 @@ class Browser:
         """What stands on the console beside notes, and requests that are not for files or for data in them."""
         wrong = []
         for event in self.events:
-            method, given = event.get("method"), event.get("params", {})
+            method = event.get("method")
+            given = event.get("params", {})
             told = method == "Runtime.consoleAPICalled" and given["type"] != "log"
             if told or method in ("Runtime.exceptionThrown", "Log.entryAdded"):
                 wrong.append(given)

@@ -154,7 +154,8 @@ def test_a_page_is_one_file_that_loads_nothing_and_runs_nothing_of_the_results(
 def test_a_report_of_a_run_answers_first_and_holds_all_that_is_promised(results: list[Path], found: Page) -> None:
     text = " ".join(" ".join(found.texts).split())
     with open_result(results[0]) as stored:
-        attributes, evidence = dict(stored.attributes), stored.group_attributes("regime/evidence")
+        attributes = dict(stored.attributes)
+        evidence = stored.group_attributes("regime/evidence")
     answer = text[text.index("Will this shoe vibrate") : text.index(" What to change ")]
     assert attributes["reasons"][0] in answer
     assert advise(parse_case(BASE, "case"), ("*.angle_deg",), 0.2, quiet).conclusion().split(";")[0] in answer
@@ -181,7 +182,8 @@ def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
     assert len(helpful) > of_run.MOST_CHANGES
     names = [each.parameter for each in helpful[: of_run.MOST_CHANGES]]
     assert [cells[0] for _, cells in rows(first)] == ["what to change", *names]
-    change, (_, cells) = helpful[0], rows(first)[1]
+    change = helpful[0]
+    _, cells = rows(first)[1]
     part = f"{100.0 * (float(change.rounded) / change.start - 1.0):+.3g} %".replace("-", "−")
     assert cells[2].endswith(f"({part})")
     assert {each.parameter for each in report.advice} <= {cells[0] for _, cells in rows(appendix)}
@@ -377,7 +379,8 @@ def test_what_a_scene_does_not_require_is_no_warning(tmp_path: Path, compiled: N
     left_out = run(loaded, tmp_path / "r.h5", force=False).left_out
     assert left_out
     text = " ".join(reported(tmp_path / "r.h5").texts)
-    accuracy, warnings = text.index("Accuracy"), text.rindex("Warnings")
+    accuracy = text.index("Accuracy")
+    warnings = text.rindex("Warnings")
     assert all(accuracy < text.index(f"Left out: {each}.") < warnings for each in left_out)
     assert "Left out" not in text[warnings:]
 

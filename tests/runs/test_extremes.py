@@ -26,7 +26,8 @@ ROUGH = [family for family in points.FAMILIES if family not in SMOOTH]
 def test_nothing_on_smooth_surfaces_is_silently_wrong(family: Any) -> None:
     kinds = set()
     for value in sorted({*family.values[::3], family.values[0], family.values[-1]}):
-        tables, at = family.tables(value), family.pace(value)
+        tables = family.tables(value)
+        at = family.pace(value)
         reference = judging.truth(tables, at)
         assert reference.rows is not None, value
         assert not reference.apart > 1e-8, value
@@ -41,7 +42,8 @@ def test_nothing_on_smooth_surfaces_is_silently_wrong(family: Any) -> None:
 @pytest.mark.parametrize("family", ROUGH, ids=lambda family: family.name)
 def test_nothing_on_rough_surfaces_is_silently_wrong(family: Any) -> None:
     for value in (family.values[1], family.values[-1]):
-        tables, at = family.tables(value), family.pace(value)
+        tables = family.tables(value)
+        at = family.pace(value)
         reference = judging.truth(tables, at)
         assert reference.rows is not None, value
         for scheme in (judging.MIDDLE, judging.BACKWARD, judging.THREE):

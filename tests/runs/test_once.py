@@ -28,13 +28,14 @@ ASKED = {
     "tables of the contact": ("brakecli.solver.contact.pad", "build_pad"),
 }
 
-Counts = Counter[tuple[str, int, float | None]]
+Counts = Counter[tuple[str, int, float | None, int | None]]
 
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> Counts:
     """Calls of each function for each system, friction and mean contact, or number of nodes (none: no tables)."""
-    counts, kept = Counts(), list[Any]()
+    counts = Counts()
+    kept = list[Any]()
 
     def counting(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         @functools.wraps(function)
@@ -43,7 +44,7 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> Counts:
             of = id(given[0]) if function.__name__ != "build_pad" else given[4]
             mean = options.get("mean")
             kept.append(mean)
-            counts[name, of, options.get("phi"), mean and id(mean)] += of > 0
+            counts[name, of, options.get("phi"), id(mean) if mean else None] += of > 0
             return function(*given, **options)
 
         return counted

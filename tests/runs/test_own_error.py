@@ -43,7 +43,9 @@ def true_error(run: Motion, exact: Motion) -> float:
 
 def sliding_matrix(system: System) -> Any:
     """A of z' = A z for backward slip on smooth surfaces, Eqs. (6) and (7)."""
-    c, stiffness, a = system.coefficients, system.contact_stiffness, np.zeros((4, 4))
+    c = system.coefficients
+    stiffness = system.contact_stiffness
+    a = np.zeros((4, 4))
     a[0, 2] = a[1, 3] = 1.0
     a[2] = np.array([-c.c_xx, -c.c_xy - c.phi * stiffness, -c.b_xx, -c.b_xy]) / c.m
     a[3] = np.array([-c.c_xy, -c.c_yy - stiffness, -c.b_xy, -c.b_yy]) / c.m
@@ -53,10 +55,13 @@ def sliding_matrix(system: System) -> Any:
 def test_an_error_grows_as_the_matrix_exponential_says() -> None:
     """Slip to one side on smooth surfaces is linear: e(t) = exp(A t) e(0). Steps add 1e-13 of the motion."""
     case = make(SQUEAL, solver__scheme="event-driven", solver__step=None, solver__tolerance=1e-12)
-    system, start = system_of(case), (3e-9, -2e-9)
+    system = system_of(case)
+    start = (3e-9, -2e-9)
     run = knowing(replace(system, initial=replace(system.initial, from_equilibrium=True)), start)
     assert not {*run.rows[:, 7]} - {-1.0}  # slip backward throughout
-    step, e, exact = expm(sliding_matrix(system) * system.interval / 10.0), np.array([*start, 0.0, 0.0]), []
+    step = expm(sliding_matrix(system) * system.interval / 10.0)
+    e = np.array([*start, 0.0, 0.0])
+    exact = []
     for _ in range(10 * system.samples + 1):
         exact.append(np.abs(e))
         e = step @ e
@@ -95,7 +100,8 @@ def test_random_shoes_know_their_errors(stratum: str, many: int) -> None:
         system = replace(system, duration=duration, interval=interval)
         run = knowing(system, evaluator="auto" if system.smooth else "midpoint", nodes=0 if system.smooth else 512)
         exact = solve(replace(system, method=replace(system.method, tolerance=1e-9)))
-        known, error = Known.of_run(run), true_error(run, exact)
+        known = Known.of_run(run)
+        error = true_error(run, exact)
         if run.work.failed or exact.work.failed or error > 1e-2:
             continue
         assert error <= SAFETY * known.of[:, 2].max() + 1e-8 or known.unsure < duration
@@ -124,7 +130,8 @@ def test_an_event_that_may_have_been_missed_is_known() -> None:
 
 def test_a_run_says_how_fine_the_next_one_has_to_be() -> None:
     for tolerance, most in ((1e-2, 1), (1e-3, 2), (1e-5, 3), (1e-7, 3)):
-        system, tried = system_of(promised(OPEN, tolerance, solver__duration=0.01)), list[System]()
+        system = system_of(promised(OPEN, tolerance, solver__duration=0.01))
+        tried = list[System]()
 
         def run(rung: System, tried: list[System] = tried) -> Motion:
             tried.append(rung)
@@ -197,8 +204,10 @@ def test_a_motion_says_by_how_much_it_amplifies(friction: float) -> None:
     settings = {"friction__coefficient": friction, "initial__at": "equilibrium", "initial__x": 1e-8}
     case = promised(SQUEAL, 1e-6, solver__duration=0.5, solver__scheme="event-driven", **settings)
     system = replace(system_of(case), tangents=True)
-    rate, a = 2.0 * math.pi * system.natural_frequencies[1], sliding_matrix(system)
-    weights, start = np.array([rate, rate, 1.0, 1.0]), np.array([0.5 / rate, 0.5 / rate, 0.5, -0.5])
+    rate = 2.0 * math.pi * system.natural_frequencies[1]
+    a = sliding_matrix(system)
+    weights = np.array([rate, rate, 1.0, 1.0])
+    start = np.array([0.5 / rate, 0.5 / rate, 0.5, -0.5])
     ends = 0.5 * np.arange(1, 513) / 512  # of the parts in which growth is noted
     exact = max(1.0, *(float(np.linalg.norm(weights * (expm(a * end) @ start))) for end in ends))
     found = last_of(by_own_error(system), solve).certificate

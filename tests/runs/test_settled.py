@@ -54,7 +54,8 @@ def settle(case: Case) -> Settled[Motion]:
 
 def made_up(*durations: float, failure: Failure = Failure.NONE) -> list[float]:
     """The durations (s) of the runs of a case that takes two seconds at first, until one is of these durations."""
-    system, tried = replace(asked(system_of(make(EXACT))), duration=2.0), list[float]()
+    system = replace(asked(system_of(make(EXACT))), duration=2.0)
+    tried = list[float]()
     judged = judge(replace(system, duration=0.05))
 
     def run(part: System) -> Judged[Motion]:
@@ -87,10 +88,8 @@ def test_a_damped_run_lasts_until_the_vibration_has_faded_and_no_twice_as_long(b
 
 def test_a_vibration_that_lasts_is_run_until_its_numbers_are_those_of_any_longer_run() -> None:
     found = settle(make(EXACT))
-    verdict, long = (
-        found.judged.verdict,
-        judge(replace(found.system, duration=8.0 * found.system.duration)).verdict,
-    )
+    verdict = found.judged.verdict
+    long = judge(replace(found.system, duration=8.0 * found.system.duration)).verdict
     assert (verdict.regime, verdict.settled) == (Regime.RELAXATION, True)
     assert verdict.amplitude == pytest.approx(long.amplitude, rel=1e-4)
 
@@ -144,7 +143,8 @@ def test_the_longest_run_is_the_limit_and_is_told() -> None:
 
 def test_a_budget_of_steps_ends_what_is_not_decided_and_counts_all_runs() -> None:
     """A thousand steps for a second: runs of 2, 4 and 8 s take 14,000 in all, and with one of 16 s 30,000."""
-    system, tried = replace(asked(system_of(make(EXACT))), duration=2.0), list[float]()
+    system = replace(asked(system_of(make(EXACT))), duration=2.0)
+    tried = list[float]()
     judged = judge(replace(system, duration=0.05))
     open_ = replace(judged.verdict, decision=UNDECIDED)
 
@@ -176,7 +176,8 @@ def test_a_measured_profile_gives_up_at_its_budget_and_goes_on_with_the_one_that
     tmp_path: Path,
 ) -> None:
     """A turn of the wheel in steps of a degree: eccentric, of three waves, and with noise of a micrometre."""
-    angle, chance = np.radians(np.arange(360.0)), np.random.default_rng(7)
+    angle = np.radians(np.arange(360.0))
+    chance = np.random.default_rng(7)
     height = 20.0 * np.sin(angle) + 8.0 * np.sin(3.0 * angle + 1.0) + chance.standard_normal(360)
     rows = (f"{place:.6f},{micrometres:.4f}" for place, micrometres in zip(0.5 * angle, height, strict=True))
     (tmp_path / "runout.csv").write_text("\n".join(["s_m,h_um", *rows]) + "\n")
@@ -221,7 +222,8 @@ LASTS = Decision("lasts", Regime.RELAXATION, Excitation.SELF_EXCITED)
 def test_a_verdict_says_whether_a_longer_run_may_say_more(
     decision: Decision, changes: dict[str, Any], unfinished: bool
 ) -> None:
-    settled_, others = changes.get("settled", False), {key: changes[key] for key in changes if key != "settled"}
+    settled_ = changes.get("settled", False)
+    others = {key: changes[key] for key in changes if key != "settled"}
     assert replace(BLANK, decision=decision, settled=settled_, **others).unfinished is unfinished
 
 
@@ -252,7 +254,8 @@ def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
         write_sweep(tmp_path, axis("friction.coefficient", values), case=OPEN), tmp_path / "s.h5", compute_units
     )
     with open_result(tmp_path / "s.h5", kind="sweep") as stored:
-        durations, regimes = stored.read("/", "duration"), stored.read("/", "regime")
+        durations = stored.read("/", "duration")
+        regimes = stored.read("/", "regime")
     assert report.findings.warned == 0
     ran = " to ".join(f"{each:.4g}" for each in durations)
     assert report.findings.sentences == [f"all 2 points have settled, in {ran} s"]
@@ -340,7 +343,8 @@ def test_the_starter_of_hysteresis_finds_the_loop_of_the_branch(tmp_path: Path) 
     assert 1 < sum(loop) < 5
     assert report.findings.hysteresis is not None
     assert report.findings.hysteresis.tolist() == loop
-    first, last = loop.index(1), loop.index(0, loop.index(1)) - 1
+    first = loop.index(1)
+    last = loop.index(0, loop.index(1)) - 1
     up = f"begins on the way up between {values[last]:g} and {values[last + 1]:g}"
     down = f"ends on the way down between {values[first]:g} and {values[first - 1]:g}"
     where = f"along friction.coefficient the vibration {up}, and {down}"
@@ -356,7 +360,7 @@ def test_amplitudes_that_are_still_on_their_way_are_no_hysteresis(tmp_path: Path
     case = TINY.replace("step = 1e-5, duration = 0.02", "duration = 1.0")
     report = inline(write_sweep(tmp_path, both, case=case), tmp_path / "s.h5", compute_units)
     assert report.findings.variables is not None
-    (up, down) = report.findings.variables["amplitude"]
+    up, down = report.findings.variables["amplitude"]
     assert up[4] < 0.95 * down[4]
     assert report.findings.hysteresis is not None
     assert report.findings.hysteresis.tolist() == [0] * 6
@@ -365,7 +369,8 @@ def test_amplitudes_that_are_still_on_their_way_are_no_hysteresis(tmp_path: Path
 
 def test_the_pad_of_the_starter_squeals_at_2_khz_as_its_modes_couple() -> None:
     case = parse_case(starters()["pad"], "pad").case
-    found, report = settle(case), stability(system_of(case))
+    found = settle(case)
+    report = stability(system_of(case))
     assert report.critical is not None
     assert report.critical.friction == pytest.approx(0.324, abs=5e-4)
     assert found.judged.verdict.regime is Regime.QUASI_HARMONIC

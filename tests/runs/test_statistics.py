@@ -33,10 +33,12 @@ WAVES = {
 @pytest.mark.parametrize("turned", [1.0, -1.0])
 def test_reference_slides_as_the_exponential_of_a_matrix(turned: float) -> None:
     tables = {**SMOOTH, "wheel": {"radius": 0.5, "angular_speed": 20.0 * turned}}
-    found, shoe = reference(tables), shoe_of(tables)
+    found = reference(tables)
+    shoe = shoe_of(tables)
     assert found is not None
     assert found.sticks + found.turns + found.lifts == 0
-    K, Q = 2.0 * shoe.a * shoe.k, 5e3
+    K = 2.0 * shoe.a * shoe.k
+    Q = 5e3
     stiffness = np.array([[shoe.c_xx, shoe.c_xy + turned * shoe.phi * K], [shoe.c_xy, shoe.c_yy + K]]) / shoe.m
     damping = np.array([[shoe.b_xx, shoe.b_xy], [shoe.b_xy, shoe.b_yy]]) / shoe.m
     rest = np.linalg.solve(stiffness, -Q / shoe.m * np.array([shoe.sin_beta, shoe.cos_beta]))
@@ -71,10 +73,12 @@ def test_reference_comes_to_rest_as_the_coulomb_oscillator() -> None:
 
 def test_exact_contact_agrees_with_a_fine_sum_and_its_length_with_the_slope() -> None:
     shoe = shoe_of({**SMOOTH, "roughness": WAVES})
-    rng, seen = np.random.default_rng(4), 0
+    rng = np.random.default_rng(4)
+    seen = 0
     xi = shoe.a * ((2.0 * np.arange(100_000) + 1.0) / 100_000 - 1.0)
     for _ in range(12):
-        theta, y = rng.uniform(0.0, 2.0 * math.pi, 2), rng.uniform(-1.1, 1.1) * shoe.height
+        theta = rng.uniform(0.0, 2.0 * math.pi, 2)
+        y = rng.uniform(-1.1, 1.1) * shoe.height
         gap = sum(g * np.sin(q * xi + p) for g, q, p in zip(shoe.g_2, shoe.q_2, theta, strict=True)) - y
         gap -= sum(g * np.sin(q * xi + p) for g, q, p in zip(shoe.g_1, shoe.q_1, shoe.p_1, strict=True))
         force, length = contact(shoe, theta, y)

@@ -70,12 +70,14 @@ def test_the_event_driven_scheme_keeps_them_too(tolerance: float) -> None:
 
 @pytest.mark.parametrize("many", counts(6, 100))
 def test_exact_steps_know_what_motions_make_of_their_rounding(many: int) -> None:
-    rng, loose = np.random.default_rng(6), 0
+    rng = np.random.default_rng(6)
+    loose = 0
     for _ in range(many):
         case, omega = flat_case(rng, 1e-12)
         case["solver"] = {"duration": 10 ** rng.uniform(1.5, 2.5) / omega, "tolerance": 1e-12}
         found = certify(system_of(Case.model_validate(case)))
-        estimate, loose = found.certificate.estimated_error, loose + (found.certificate.estimated_error > 4e-12)
+        estimate = found.certificate.estimated_error
+        loose = loose + (found.certificate.estimated_error > 4e-12)
         assert found.motion.system.method.scheme == "piecewise-exact"
         error = errors(found.motion.rows, truth(Case.model_validate(case), 1e-13)).error
         assert error <= 10.0 * estimate + 1e-11  # both err by chance; and what the truth itself may be off
@@ -85,7 +87,8 @@ def test_exact_steps_know_what_motions_make_of_their_rounding(many: int) -> None
 @pytest.mark.parametrize("many", counts(30, 500))
 def test_rounding_that_exact_runs_carry_along_is_more_than_what_other_steps_show(many: int) -> None:
     """Runs with other steps have other matrices, and other places of their parts beside events."""
-    rng, seen = np.random.default_rng(8), 0
+    rng = np.random.default_rng(8)
+    seen = 0
     for _ in range(many):
         case, omega = flat_case(rng, 1e-12)
         case["solver"] = {"duration": 10 ** rng.uniform(2.0, 3.3) / omega, "tolerance": 1e-2}
@@ -190,7 +193,9 @@ def test_samples_of_any_interval_keep_their_tolerance(interval: float) -> None:
 
 @pytest.mark.parametrize("many", counts(2, 60))
 def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
-    rng, ways, drawn = np.random.default_rng(3), set[str](), 0
+    rng = np.random.default_rng(3)
+    ways = set[str]()
+    drawn = 0
     while drawn < many:
         case = promises.random_case(rng, promises.KINDS[-1 - drawn % len(promises.KINDS)])
         try:

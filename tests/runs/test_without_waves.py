@@ -72,7 +72,8 @@ def test_a_rough_shoe_is_continued_by_the_curve_of_its_force(friction: float, fa
     assert continued(shoe).fate is fate
     flat = system_of(make(SQUEAL | {"roughness": BUMPS}, friction__coefficient=friction, solver__duration=2.0))
     speeds = solve(flat).rows[:, 2]
-    late, early = speeds[-1000:].std(), speeds[: len(speeds) // 8].std()
+    late = speeds[-1000:].std()
+    early = speeds[: len(speeds) // 8].std()
     assert bool(late > 0.5 * early) == (fate is Fate.LASTS)
 
 

@@ -138,7 +138,8 @@ def test_correlations_are_those_of_the_matrix() -> None:
 
 def test_indices_of_a_linear_margin_are_its_shares() -> None:
     """Of Σ c x with deviations s, both indices are c² s²/Σ c² s²."""
-    weights, deviations = np.array([1.0, 2.0, 0.5]), (1.0, 0.5, 0.1)
+    weights = np.array([1.0, 2.0, 0.5])
+    deviations = (1.0, 0.5, 0.1)
     study = study_of(*({**NORMAL, "deviation": each} for each in deviations), samples=4096)
     shares = (weights * deviations) ** 2 / ((weights * deviations) ** 2).sum()
     found = Indices.find("growth_rate", study.names, for_indices(study) @ weights, 0)
@@ -149,7 +150,8 @@ def test_indices_of_a_linear_margin_are_its_shares() -> None:
 
 def test_indices_of_the_ishigami_function_are_those_of_its_closed_form() -> None:
     """sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1; T. Ishigami and T. Homma, ISUMA 1990: the variances of its parts."""
-    a, b = 7.0, 0.1
+    a = 7.0
+    b = 0.1
     parts = {
         "1": 0.5 * (1.0 + b * math.pi**4 / 5.0) ** 2,
         "2": a**2 / 8.0,
@@ -183,8 +185,10 @@ def test_intervals_cover_the_truth(sampling: str, margin: float, replications: i
     A 95 % interval covers at least 92 % of 400; of 60, whose share has a deviation of 2.8 %, at least 85 %. Of
     simple random samples it is as wide as Wald's, 2 · 1.96 √(p q/n), times 1.5 at most; others are narrower.
     """
-    probability, weights = float(stats.norm.cdf(-margin)), np.array([0.6, 0.8])
-    covered, widths = 0, []
+    probability = float(stats.norm.cdf(-margin))
+    weights = np.array([0.6, 0.8])
+    covered = 0
+    widths = []
     for seed in range(replications):
         study = study_of(NORMAL, NORMAL, samples=1024, sampling=sampling, seed=seed)
         found = Probability.of(drawn(study) @ weights < -margin)

@@ -20,10 +20,14 @@ class PiecewiseExact:
     """Exact motion (x, y, vx, vy) of a flat case with constant speed and load."""
 
     def __init__(self, system: System, grid: float) -> None:
-        c, q = system.coefficients, float(system.load["value"][0])
-        self.belt, self.phi, self.stiffness = system.belt_speed, c.phi, system.contact_stiffness
+        c = system.coefficients
+        q = float(system.load["value"][0])
+        self.belt = system.belt_speed
+        self.phi = c.phi
+        self.stiffness = system.contact_stiffness
         self.c = c
-        self.q_x, self.q_y = q * c.sin_beta, q * c.cos_beta
+        self.q_x = q * c.sin_beta
+        self.q_y = q * c.cos_beta
         self.grid = grid
         self.generators: dict[tuple[bool, int], NDArray[np.float64]] = {}
         self.propagators: dict[tuple[bool, int], NDArray[np.float64]] = {}
@@ -32,7 +36,8 @@ class PiecewiseExact:
     def generator(self, touching: bool, side: int) -> NDArray[np.float64]:
         """ż = A z for z = (x, y, vx, vy, 1)."""
         if (touching, side) not in self.generators:
-            c, k = self.c, self.stiffness if touching else 0.0
+            c = self.c
+            k = self.stiffness if touching else 0.0
             a = np.zeros((5, 5))
             a[0, 2] = a[1, 3] = 1.0
             a[3] = np.array([-c.c_xy, -c.c_yy - k, -c.b_xy, -c.b_yy, -self.q_y]) / c.m
@@ -85,7 +90,8 @@ class PiecewiseExact:
     def run(self, start: Vector, touching: bool, side: int, samples: int, per_sample: int = 1) -> Vector:
         """Samples, `per_sample` grid times apart, from a state in a known phase."""
         z = np.append(start, 1.0)
-        rows, self.visited = [z[:4].copy()], [(touching, side)]
+        rows = [z[:4].copy()]
+        self.visited = [(touching, side)]
         for _ in range(samples):
             for _ in range(per_sample):
                 left = self.grid
@@ -114,9 +120,11 @@ class PiecewiseExact:
         dips = ~broken & (margins @ (a @ z) < 0.0) & (margins @ (a @ end) > 0.0)
         if not broken.any() and not dips.any():
             return end, 0.0, touching, side
-        first, which = 1.0, -1
+        first = 1.0
+        which = -1
         for index in np.flatnonzero(broken | dips):
-            row, last = margins[index], 1.0
+            row = margins[index]
+            last = 1.0
             if dips[index]:
                 if row @ a @ at(1e-9) >= 0.0 or row @ a @ at(1.0) <= 0.0:
                     continue  # by rounding alone
@@ -127,7 +135,8 @@ class PiecewiseExact:
             if begin is not None:
                 root = brentq(lambda part, row=row: row @ at(part), begin * last, last, xtol=1e-15, rtol=1e-14)
                 if root < first:
-                    first, which = root, int(index)
+                    first = root
+                    which = int(index)
         if which < 0:
             return end, 0.0, touching, side
         z = at(first)

@@ -120,7 +120,8 @@ class Gap:
         """The intervals on which the gap exceeds `lift`, cut at the extremes."""
         pieces = []
         for left, right in pairwise(self.extremes):
-            at_left, at_right = self.value(left) - lift, self.value(right) - lift
+            at_left = self.value(left) - lift
+            at_right = self.value(right) - lift
             if at_left > 0 and at_right > 0:
                 pieces.append((left, right))
             elif at_left > 0 or at_right > 0:
@@ -206,7 +207,8 @@ def gaps(draw: st.DrawFn, lowest: float = -1.3, highest: float = 1.3, *, most: i
     above 1 nowhere; half of them without phases.
     """
     phases = draw(st.booleans())
-    shoe, wheel = draw(profiles(phases=phases, most=most)), draw(profiles(phases=phases, most=most))
+    shoe = draw(profiles(phases=phases, most=most))
+    wheel = draw(profiles(phases=phases, most=most))
     if least and len(shoe) + len(wheel) < least:
         wheel = (Wave(2e-5, 0.02),)
     crest = sum(abs(w.g) for w in shoe + wheel) or 1e-5

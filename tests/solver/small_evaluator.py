@@ -9,7 +9,8 @@ KIND = kinds().index("spring")  # a file is imported when its row is there
 
 @kernel(EVALUATE)
 def evaluate(x: float, y: float, layer: Layer) -> None:
-    pad, contact = layer.pad, layer.contact
+    pad = layer.pad
+    contact = layer.contact
     touching = 1.0 if y < 0.0 else 0.0
     contact.stiffness = touching * 2.0 * pad.half_length * pad.k
     contact.normal_force = -contact.stiffness * y

@@ -8,7 +8,9 @@ from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
-hold, advance, sample = loop.hold, loop.advance, loop.sample
+hold = loop.hold
+advance = loop.advance
+sample = loop.sample
 LAG = 0
 MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
 VELOCITIES: tuple[str, ...] = ("v_x", "v_y")
@@ -30,19 +32,29 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
 
 @kernel(records.PREPARE)
 def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
-    h, inertia = s.h, c.m / s.h
-    problem.a_11, problem.a_12 = inertia + c.b_xx + c.c_xx * h, c.b_xy + c.c_xy * h
+    h = s.h
+    inertia = c.m / s.h
+    problem.a_11 = inertia + c.b_xx + c.c_xx * h
+    problem.a_12 = c.b_xy + c.c_xy * h
     problem.a_22 = inertia + c.b_yy + c.c_yy * h
     problem.g_1 = inertia * state.v_x - c.c_xx * state.x - c.c_xy * state.y - problem.load * c.sin_beta
     problem.g_2 = inertia * state.v_y - c.c_yy * state.y - c.c_xy * state.x - problem.load * c.cos_beta
-    problem.x_0, problem.y_0, problem.gain = state.x, state.y, h
-    problem.belt, problem.phi = problem.belt_next, c.phi
-    problem.d, problem.e, problem.normal_force = state.v_x, state.v_y, state.force
+    problem.x_0 = state.x
+    problem.y_0 = state.y
+    problem.gain = h
+    problem.belt = problem.belt_next
+    problem.phi = c.phi
+    problem.d = state.v_x
+    problem.e = state.v_y
+    problem.normal_force = state.force
 
 
 @kernel(records.FINISH)
 def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
-    p, q, dx, dy = problem.d, problem.e, s.h * problem.d, s.h * problem.e
+    p = problem.d
+    q = problem.e
+    dx = s.h * problem.d
+    dy = s.h * problem.e
     friction = problem.a_11 * p + problem.a_12 * q - problem.g_1
     work.belt += s.h * friction * problem.belt
     work.friction -= friction * (dx - s.h * problem.belt)
@@ -54,4 +66,6 @@ def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, 
     work.force_before = contact.normal_force
     state.x += dx
     state.y += dy
-    state.v_x, state.v_y, state.force = p, q, problem.normal_force
+    state.v_x = p
+    state.v_y = q
+    state.force = problem.normal_force

@@ -23,8 +23,12 @@ class SolveIvp:
     """The motion (x, y, vx, vy) of a case, phase by phase: slip either way, or stick."""
 
     def __init__(self, system: System, relative: float, max_step: float) -> None:
-        self.system, self.relative, self.max_step = system, relative, max_step
-        self.c, self.belt, self.q = system.coefficients, system.belt_speed, float(system.load["value"][0])
+        self.system = system
+        self.relative = relative
+        self.max_step = max_step
+        self.c = system.coefficients
+        self.belt = system.belt_speed
+        self.q = float(system.load["value"][0])
         self.evaluate = contact.load("exact")
         self.layer = build_layer(self.evaluate, system.pad)
         self.visited: list[int] = []
@@ -40,7 +44,8 @@ class SolveIvp:
 
     def against(self, z: Vector) -> tuple[float, float]:
         """Forces of links and load."""
-        c, (x, y, v_x, v_y) = self.c, z
+        c = self.c
+        x, y, v_x, v_y = z
         return (
             c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + self.q * c.sin_beta,
             c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y + self.q * c.cos_beta,
@@ -48,7 +53,8 @@ class SolveIvp:
 
     def slope(self, side: int, t: float, z: Vector) -> list[float]:
         """(6)-(7) in a phase."""
-        normal, (against_x, against_y) = self.normal(t, z), self.against(z)
+        normal = self.normal(t, z)
+        against_x, against_y = self.against(z)
         pull = -side * self.c.phi * normal - against_x if side else 0.0
         return [z[2], z[3], pull / self.c.m, (normal - against_y) / self.c.m]
 
@@ -73,12 +79,16 @@ class SolveIvp:
 
         events: list[Any] = [slides] if side else [holds_back, holds_on]
         for event in events:
-            event.terminal, event.direction = True, -1
+            event.terminal = True
+            event.direction = -1
         return events
 
     def run(self, start: Vector, times: Vector) -> Vector:
         """The motion at the times; the start slides."""
-        z, t, side, rows = start.copy(), 0.0, 1 if start[2] > self.belt else -1, [start]
+        z = start.copy()
+        t = 0.0
+        side = 1 if start[2] > self.belt else -1
+        rows = [start]
         for _ in count():
             self.visited.append(side)
             events = self.margins(side)
@@ -98,9 +108,11 @@ class SolveIvp:
             rows += list(np.transpose(found.y))
             if found.status == 0:
                 return np.array(rows)
-            hits, states = found.t_events or [], found.y_events or []
+            hits = found.t_events or []
+            states = found.y_events or []
             which = next(index for index, hit in enumerate(hits) if hit.size)
-            t, z = float(hits[which][0]), states[which][0].copy()
+            t = float(hits[which][0])
+            z = states[which][0].copy()
             z[2] = self.belt
             side = self.hold(t, z) if side else (-1 if which == 0 else 1)
         raise AssertionError

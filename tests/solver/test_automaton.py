@@ -55,7 +55,8 @@ def test_the_side_is_the_sign_of_the_sliding_velocity_and_none_in_flight() -> No
 
 
 def test_events_without_progress_stall_a_motion_and_those_with_progress_do_not() -> None:
-    since, events = 0.0, 0
+    since = 0.0
+    events = 0
     for _ in range(1000):
         since, events = counted(since, events, 1e-12, 1.0)
     assert (since, events, stalled(events)) == (0.0, 1000, False)

@@ -31,8 +31,12 @@ def case_b(x: float, y: float, travel: float) -> Gap:
 @settings(max_examples=120)
 @campaign
 def test_exact_agrees_with_quadrature_between_the_roots(gap: Gap) -> None:
-    found, k, length = gap.evaluate("exact"), gap.k, 2 * gap.a
-    delta, height, steep = gap.rounding, abs(gap.y) + gap.crest, gap.steepest(wheel_only=True)
+    found = gap.evaluate("exact")
+    k = gap.k
+    length = 2 * gap.a
+    delta = gap.rounding
+    height = abs(gap.y) + gap.crest
+    steep = gap.steepest(wheel_only=True)
     # Sums of n terms round n times, and quadrature adds once its accuracy, that of the integrand.
     n = 2 + gap.sines[0].size
     force = k * gap.integral(gap.value, delta)
@@ -42,7 +46,8 @@ def test_exact_agrees_with_quadrature_between_the_roots(gap: Gap) -> None:
     store_x = k * gap.integral(lambda xi: gap.value(xi) * gap.wheel_slope(xi), steep * delta)
     assert found.store_x == pytest.approx(store_x, rel=0, abs=k * length * steep * delta * n)
     # Rounding moves the gap by at most delta, so the touching set lies between those where it exceeds +-delta.
-    least, most = gap.length(delta) - 8 * EPS * length, gap.length(-delta) + 8 * EPS * length
+    least = gap.length(delta) - 8 * EPS * length
+    most = gap.length(-delta) + 8 * EPS * length
     assert k * least <= found.stiffness <= k * most
     assert found.fraction == pytest.approx(found.stiffness / (k * length), rel=4 * EPS)
     rise = k * gap.integral(gap.wheel_slope, steep * 1e4 * EPS)  # phases up to 2000 rad
@@ -55,7 +60,8 @@ def test_exact_agrees_with_quadrature_between_the_roots(gap: Gap) -> None:
 @given(gaps(-3.0, -1.001, most=4))
 def test_the_evaluators_agree_where_the_pad_touches_everywhere(gap: Gap) -> None:
     closed, exact, auto = (gap.evaluate(name) for name in ("closed-form", "exact", "auto"))
-    height, steep = abs(gap.y) + gap.crest, gap.steepest(wheel_only=True)
+    height = abs(gap.y) + gap.crest
+    steep = gap.steepest(wheel_only=True)
     scale = 2 * gap.a * gap.k * np.array([height, 1, steep, 0, height**2, height * steep])
     scale[3] = 1  # fraction
     # The phases, up to 2 pi (x + travel)/wavelength = 1600, round to 1600 EPS = 4e-13 rad; four times that.
@@ -116,8 +122,10 @@ def test_the_midpoint_rule_errs_downwards_and_by_no_more_than_its_kinks_explain(
     """
     # Two surfaces that match exactly leave a gap that is rounding alone: whether it touches is chance.
     assume(np.abs(gap.values(np.linspace(-gap.a, gap.a, 33))).max() > gap.rounding)
-    exact, found = gap.evaluate("exact"), gap.evaluate("midpoint", nodes=nodes)
-    spacing, roots = 2 * gap.a / nodes, 2 * len(gap.extremes)
+    exact = gap.evaluate("exact")
+    found = gap.evaluate("midpoint", nodes=nodes)
+    spacing = 2 * gap.a / nodes
+    roots = 2 * len(gap.extremes)
     # Rounding of the gap, and of the sum over the nodes: half a unit in the last place for each addition.
     rounding = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size) + nodes * EPS / 2 * exact.normal_force
     error = exact.normal_force - found.normal_force
@@ -132,10 +140,13 @@ def test_the_midpoint_error_falls_with_the_square_of_the_spacing() -> None:
     """A root where the gap has the slope s, at v spacings from the nearest edge of a cell, makes the force
     k |s| spacing² v²/2 too small. v is uniform in 0 ... 1/2, so that the mean error is k spacing² sum |s| / 24.
     """
-    nodes, positions = (64, 128, 256, 512, 1024, 2048, 4096), 400
+    nodes = (64, 128, 256, 512, 1024, 2048, 4096)
+    positions = 400
     rng = np.random.default_rng(20)
     pads = [case_b(0.0, 0.0, 0.0).pad(n) for n in nodes]
-    errors, slopes, forces = np.zeros((positions, len(nodes))), np.zeros(positions), np.zeros(positions)
+    errors = np.zeros((positions, len(nodes)))
+    slopes = np.zeros(positions)
+    forces = np.zeros(positions)
     xi = np.linspace(-0.05, 0.05, 5001)
     for i in range(positions):
         at = case_b(rng.uniform(-1e-3, 1e-3), rng.uniform(-60e-6, 0.0), rng.uniform(0.0, 1.0))
@@ -193,7 +204,8 @@ def test_default_nodes_resolve_the_shortest_wave(waves: tuple[float, ...], nodes
 @campaign
 def test_stiffness_is_the_force_s_derivative(gap: Gap, evaluator: str, part: float) -> None:
     """F_y is convex in y, so that a difference quotient lies between the stiffnesses at its two ends."""
-    eta, pad = part * gap.crest, gap.pad()
+    eta = part * gap.crest
+    pad = gap.pad()
     near, far = (gap.evaluate(evaluator, dy=dy, pad=pad) for dy in (-eta, eta))
     assume(near.valid == far.valid == 1)
     quotient = (near.normal_force - far.normal_force) / (2 * eta)
@@ -207,8 +219,10 @@ def test_tangential_is_the_force_s_derivative_along_the_wheel(gap: Gap, evaluato
     """Between x - eta and x + eta the slope under the pad changes by eta times f2's curvature, and the touching
     set by no more than the gap moves: what touches at y - eta slope but not at y + eta slope.
     """
-    nodes, eta = 256, 1e-7
-    steep, curved = gap.steepest(wheel_only=True), gap.steepest(2, wheel_only=True)
+    nodes = 256
+    eta = 1e-7
+    steep = gap.steepest(wheel_only=True)
+    curved = gap.steepest(2, wheel_only=True)
     assume(steep > 0)
     pad = gap.pad(nodes)
     before, at, after = (gap.evaluate(evaluator, dx=dx, pad=pad) for dx in (-eta, 0.0, eta))
@@ -226,8 +240,11 @@ def test_tangential_is_the_force_s_derivative_along_the_wheel(gap: Gap, evaluato
 @given(gaps(least=1), st.sampled_from(EVALUATORS))
 def test_the_store_s_derivatives_are_the_forces(gap: Gap, evaluator: str) -> None:
     """V has a bounded second derivative M in x and in y, so that a central difference is right to M eta/2."""
-    nodes, height, steep = 256, abs(gap.y) + gap.crest, gap.steepest(wheel_only=True)
-    pad, stiffness = gap.pad(nodes), 2 * gap.a * gap.k
+    nodes = 256
+    height = abs(gap.y) + gap.crest
+    steep = gap.steepest(wheel_only=True)
+    pad = gap.pad(nodes)
+    stiffness = 2 * gap.a * gap.k
     at = gap.evaluate(evaluator, pad=pad)
     rounding = stiffness * height * gap.rounding * (1 + gap.sines[0].size)
     eta = 1e-4 * height
@@ -235,7 +252,8 @@ def test_the_store_s_derivatives_are_the_forces(gap: Gap, evaluator: str) -> Non
     assume(all(end.valid == 1 and end.kind == at.kind for end in (*ends, at)))
     quotient = (ends[0].store - ends[1].store) / (2 * eta)
     assert at.normal_force == pytest.approx(quotient, rel=0, abs=stiffness * eta / 2 + rounding / eta)
-    eta, bend = 1e-6, stiffness * (steep**2 + height * gap.steepest(2, wheel_only=True))
+    eta = 1e-6
+    bend = stiffness * (steep**2 + height * gap.steepest(2, wheel_only=True))
     ends = [gap.evaluate(evaluator, dx=dx, pad=pad) for dx in (-eta, eta)]
     quotient = (ends[1].store - ends[0].store) / (2 * eta)
     tolerance = bend * eta / 2 + rounding / eta
@@ -252,7 +270,9 @@ def test_the_store_s_derivatives_are_the_forces(gap: Gap, evaluator: str) -> Non
 def test_auto_changes_over_without_a_jump_in_the_force(gap: Gap) -> None:
     pad = gap.pad()
     ys = [-gap.crest, gap.crest]
-    low, high = -4 * gap.crest, 4 * gap.crest  # the last height at which the bound proves full contact
+    # the last height at which the bound proves full contact
+    low = -4 * gap.crest
+    high = 4 * gap.crest
     while math.nextafter(low, high) < high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if coverage(middle, pad.constants) == FULL else (low, middle)
@@ -281,7 +301,8 @@ def test_auto_on_smooth_surfaces_is_the_closed_form_bit_for_bit(gap: Gap, dy: fl
 @given(gaps(least=1), st.sampled_from([1.0, 1 - 1e-15, 1 - 1e-9, 1 - 1e-4, 1 - 1e-2]))
 def test_a_pad_is_never_taken_for_full_or_clear_where_a_place_contradicts(gap: Gap, part: float) -> None:
     """The worst place of the wheel may pass under any place of the shoe, so the shoe's own extremes decide."""
-    pad, highest = gap.pad(0), sum(abs(wave.g) for wave in gap.wheel)
+    pad = gap.pad(0)
+    highest = sum(abs(wave.g) for wave in gap.wheel)
     bare = Gap(gap.shoe, (), gap.a, 0.0, 0.0)
     f1 = -bare.values(np.array(bare.extremes))
     claims = 0
@@ -329,7 +350,9 @@ def test_exact_finds_a_patch_however_narrow(depth: float) -> None:
         if abs(xi) > 0.99 * gap.a or top - second < 2 * d:
             continue
         found += 1
-        curvature, third, fourth = -gap.value(xi, 2), gap.value(xi, 3), gap.value(xi, 4)
+        curvature = -gap.value(xi, 2)
+        third = gap.value(xi, 3)
+        fourth = gap.value(xi, 4)
         half = math.sqrt(2 * d / curvature)
         result = gap.evaluate("exact", dy=top - d, pad=gap.pad(0))
         following = d * (third**2 / curvature**3 + abs(fourth) / curvature**2)
@@ -363,7 +386,8 @@ def test_the_force_is_never_below_zero_by_rounding() -> None:
     positive = 0
     for _ in range(60):
         gap = random_gap(rng)
-        pad, top = gap.pad(0), max(gap.value(xi) for xi in gap.extremes)
+        pad = gap.pad(0)
+        top = max(gap.value(xi) for xi in gap.extremes)
         for ulps in range(-40, 41, 4):
             force = gap.evaluate("exact", dy=top + ulps * math.ulp(gap.crest), pad=pad).normal_force
             assert force >= 0.0
@@ -376,7 +400,9 @@ def test_exact_finds_the_edges_of_a_hole_with_a_flat_bottom(depth: float) -> Non
     """Three derivatives vanish at the bottom, so that only the fourth tells that the pad touches beside it:
     g (cos wξ - cos(2wξ)/4) is 3g/4 - g w⁴ ξ⁴/8 there, here upside down and anywhere on the pad.
     """
-    rng, length, g = np.random.default_rng(25), 0.05, 4e-5
+    rng = np.random.default_rng(25)
+    length = 0.05
+    g = 4e-5
     omega = 2 * math.pi / length
     half = (8 * depth) ** 0.25 / omega
     for _ in range(300):
@@ -413,27 +439,34 @@ def test_exact_finds_on_the_way_what_it_finds_from_nothing(pads: int) -> None:
     """What is kept from one evaluation to the next, along paths of small and large moves, some past an extreme of
     the gap by a hair, against a layer that knows nothing.
     """
-    rng, evaluate, checked = np.random.default_rng(29), contact.load("exact"), 0
+    rng = np.random.default_rng(29)
+    evaluate = contact.load("exact")
+    checked = 0
     for _ in range(pads):
         gap = random_gap(rng)
-        pad, levels, (steep, crest) = (
-            gap.pad(0),
-            [gap.value(xi) for xi in gap.extremes],
-            (gap.steepest(), gap.crest),
-        )
-        layer, x, y = build_layer(evaluate, pad), gap.x, 0.0
+        pad = gap.pad(0)
+        levels = [gap.value(xi) for xi in gap.extremes]
+        steep = gap.steepest()
+        crest = gap.crest
+        layer = build_layer(evaluate, pad)
+        x = gap.x
+        y = 0.0
         layer.angles[:] = gap.angles
         scale = 2 * gap.a * gap.k * np.array([crest, 1, steep, 0, crest**2, crest * steep])
         scale[3] = 1  # fraction
-        move, lift = 10 ** rng.uniform(-8, -3), crest * 10 ** rng.uniform(-5, -1)
+        move = 10 ** rng.uniform(-8, -3)
+        lift = crest * 10 ** rng.uniform(-5, -1)
         for _ in range(60):
             where = rng.random()
             if where < 0.3:  # there and back, or past an extreme
-                x, y = gap.x, rng.choice(levels) + crest * 10 ** rng.uniform(-9, -2) * rng.choice([-1, 1])
+                x = gap.x
+                y = rng.choice(levels) + crest * 10 ** rng.uniform(-9, -2) * rng.choice([-1, 1])
             elif where < 0.35:
-                x, y = rng.uniform(-1, 1), crest * rng.uniform(-1.2, 1.2)
+                x = rng.uniform(-1, 1)
+                y = crest * rng.uniform(-1.2, 1.2)
             else:
-                x, y = x + move * rng.normal(), y + lift * rng.normal()
+                x = x + move * rng.normal()
+                y = y + lift * rng.normal()
             fresh = unfilled("exact", pad)
             fresh.angles[:] = layer.angles
             for each in (layer, fresh):
@@ -487,7 +520,8 @@ def test_heights_and_stiffness_scale_exactly(gap: Gap, evaluator: str, height: i
         gap.travel,
         math.ldexp(gap.k, stiffness),
     )
-    force, energy = height + stiffness, 2 * height + stiffness
+    force = height + stiffness
+    energy = 2 * height + stiffness
     powers = [force, stiffness, force, 0, energy, energy]
     expected = np.ldexp(outputs(gap.evaluate(evaluator)), powers)
     np.testing.assert_allclose(outputs(other.evaluate(evaluator)), expected, rtol=0.0, atol=5e-324 * 2.0**70)
@@ -505,9 +539,12 @@ def many_waves(seed: int, count: int) -> Surface:
 @pytest.mark.parametrize("level", [-1.0, -0.1, 0.0, 0.1])
 def test_hundreds_of_waves_are_summed_as_well_as_one(level: float) -> None:
     """Two ways to the same integrals: in full contact tables against pairs of waves, else a fine sum."""
-    a, k = 0.02, 1e8
-    shoe, wheel = many_waves(1, 60), many_waves(2, 140)
-    pad, angles = build_pad(k, a, shoe, wheel, 0), np.random.default_rng(3).uniform(-6, 0, 140)
+    a = 0.02
+    k = 1e8
+    shoe = many_waves(1, 60)
+    wheel = many_waves(2, 140)
+    pad = build_pad(k, a, shoe, wheel, 0)
+    angles = np.random.default_rng(3).uniform(-6, 0, 140)
     crest = float(shoe.g.sum() + wheel.g.sum())
     layer = build_layer(contact.load("exact"), pad)
     layer.angles[:] = angles
@@ -539,7 +576,8 @@ def test_hundreds_of_waves_are_summed_as_well_as_one(level: float) -> None:
 def test_waves_of_almost_equal_length_lose_no_digits(apart: float) -> None:
     """Quotients sin z/z with z near 0, in the store's products; quadrature knows nothing of them."""
     gap = Gap((Wave(2e-5, 0.02, 40.0),), (Wave(3e-5, 0.02 * (1 + apart), 10.0),), 0.03, 1e-3, -5e-6)
-    found, height = gap.evaluate("exact"), abs(gap.y) + gap.crest
+    found = gap.evaluate("exact")
+    height = abs(gap.y) + gap.crest
     store = 0.5 * gap.k * gap.integral(lambda xi: gap.value(xi) ** 2, height * gap.rounding)
     assert found.store == pytest.approx(store, rel=0, abs=2 * gap.a * gap.k * height * gap.rounding)
     full = Gap(gap.shoe, gap.wheel, gap.a, gap.x, -6e-5, 0.0, gap.k)
@@ -563,7 +601,8 @@ def test_the_force_alone_is_that_of_the_whole_evaluation(waves: int, nodes: int)
     for name, (whole, alone) in pairs.items():
         layers = [build_layer(each, pad) for each in (whole, alone)]
         for _ in range(50):
-            x, y = rng.uniform(-0.02, 0.02), gap.crest * (rng.uniform(-1, 1) if name == "midpoint" else -2.0)
+            x = rng.uniform(-0.02, 0.02)
+            y = gap.crest * (rng.uniform(-1, 1) if name == "midpoint" else -2.0)
             for evaluate, layer in zip((whole, alone), layers, strict=True):
                 layer.angles[:] = gap.angles
                 evaluate(x, y, layer)

@@ -79,7 +79,9 @@ def test_a_row_added_to_a_registry_can_be_named_in_a_case_at_once(monkeypatch: p
 @pytest.mark.parametrize("name", EVALUATORS)
 def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) -> None:
     evaluate = contact.load(name.replace("_", "-"))
-    rng, valid, kinds = np.random.default_rng(41), 0, set()
+    rng = np.random.default_rng(41)
+    valid = 0
+    kinds = set()
     for _ in range(200):
         shoe, wheel = (
             surface(
@@ -119,7 +121,10 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
 def test_an_evaluator_is_accepted_by_the_step(name: str) -> None:
     pad = build_pad(1e8, 0.05, surface(), surface(), 64)
     problem = new(PROBLEM)
-    problem.a_11, problem.a_22, problem.gain, problem.phi = 1e6, 1e6, 0.1, 0.3
+    problem.a_11 = 1e6
+    problem.a_22 = 1e6
+    problem.gain = 0.1
+    problem.phi = 0.3
     assert newton(build_layer(contact.load(name.replace("_", "-")), pad), problem, 100)[0] == SOLVED
 
 
@@ -191,7 +196,9 @@ def test_a_scheme_starts_at_the_given_state(name: str) -> None:
         np.testing.assert_allclose((state.x, state.y), next_, rtol=1e-15)
     kinetic, links, position, back = scheme.mechanical_energy(COEFFICIENTS, weights, state)
     # At most half a step off the start: 1/2 m v² to h a/v, the links' energy to h v/r.
-    c, (x, y), (v_x, v_y) = COEFFICIENTS, START[0], START[1]
+    c = COEFFICIENTS
+    x, y = START[0]
+    v_x, v_y = START[1]
     assert kinetic == pytest.approx(0.5 * c.m * (v_x**2 + v_y**2), rel=1e-3)
     assert links == pytest.approx(0.5 * (c.c_xx * x * x + 2 * c.c_xy * x * y + c.c_yy * y * y), rel=0.2)
     assert position == pytest.approx((x, y), rel=0.1)
@@ -204,11 +211,15 @@ def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: 
     checked = 0
     for theta in weights_of(name):
         weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
-        state, problem, work = new(scheme.STATE), new(PROBLEM), new(WORK)
+        state = new(scheme.STATE)
+        problem = new(PROBLEM)
+        work = new(WORK)
         scheme.begin(weights, state, *START)
         for field in PROBLEM.names or ():
             problem[field] = np.nan
-        problem.load, problem.belt_now, problem.belt_next = 5e3, 1.0, 1.0
+        problem.load = 5e3
+        problem.belt_now = 1.0
+        problem.belt_next = 1.0
         scheme.prepare(COEFFICIENTS, weights, state, problem)
         assert problem.a_11 > 0
         assert problem.a_11 * problem.a_22 > problem.a_12**2

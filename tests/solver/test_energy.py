@@ -20,7 +20,8 @@ SCHEMES = SYMMETRIC + DAMPING
 def test_account_closes_with_the_square_of_the_step_on_a_rough_pad_that_opens(
     scheme: str, theta: tuple[float, ...]
 ) -> None:
-    steps, errors = [4e-5, 2e-5, 1e-5, 5e-6], []
+    steps = [4e-5, 2e-5, 1e-5, 5e-6]
+    errors = []
     for step in steps:
         case = make(
             ROUGH, contact__evaluator="exact", solver__scheme=scheme, solver__theta=theta, solver__step=step,
@@ -90,7 +91,8 @@ def test_friction_never_feeds_energy_in_the_frame_of_the_wheel(
     base: dict[str, Any] = SQUEAL if flat else {**ROUGH, "wheel": {"radius": 0.5, "angular_speed": 0.1}}
     case = make(base, solver__scheme=scheme, solver__theta=theta, friction__coefficient=0.8, solver__step=2e-5)
     motion = Stepping(system_of(case))
-    slips, sticks = 0, 0
+    slips = 0
+    sticks = 0
     for _ in range(1500):
         motion.block(int(motion.counts.level) + 1)
         p = motion.plant.problem
@@ -99,6 +101,7 @@ def test_friction_never_feeds_energy_in_the_frame_of_the_wheel(
         rounding = 1e-15 * (abs(p.a_11 * p.d) + abs(p.a_12 * p.e) + abs(p.g_1))
         assert friction * sliding <= rounding * abs(sliding)
         assert abs(friction) <= 0.8 * p.normal_force + 4.0 * rounding
-        slips, sticks = slips + (sliding != 0.0), sticks + (sliding == 0.0)
+        slips = slips + (sliding != 0.0)
+        sticks = sticks + (sliding == 0.0)
     assert slips > 100
     assert sticks > 10 or not flat

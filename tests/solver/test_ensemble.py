@@ -66,7 +66,9 @@ def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
     sharp = [replace(each, method=replace(each.method, tolerance=1e-9)) for each in loose]
     half = [replace(each, method=replace(each.method, step=0.5 * each.step)) for each in sharp]
     runs = zip(sharp, run_together(loose), run_together(sharp), run_together(half), strict=True)
-    compared, partly, errors = 0, 0, list[list[float]]()
+    compared = 0
+    partly = 0
+    errors = list[list[float]]()
     for each, rough, exact, finer in runs:
         alone = by_events(each, 1e-8)
         if exact is None or rough is None or finer is None:
@@ -89,7 +91,8 @@ def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
 def test_errors_in_a_lane_fall_with_the_third_power_of_the_step() -> None:
     """Where the pad touches everywhere; patches that begin and end are kinks."""
     full = system(step=2.5e-5, tolerance=1e-13, load__force=5e4, initial__at="equilibrium", initial__vx=0.05)
-    exact, errors = solve(full, Method("event-driven", tolerance=1e-13)), list[float]()
+    exact = solve(full, Method("event-driven", tolerance=1e-13))
+    errors = list[float]()
     for halvings in range(4):
         shorter = replace(full.method, step=2.5e-5 / 2**halvings)
         (found,) = run_together([replace(full, method=shorter)])
@@ -132,7 +135,8 @@ def test_fewer_waves_and_a_smooth_shoe_are_the_same_in_a_lane() -> None:
     ],
 )
 def test_what_a_lane_cannot_compute_leaves_it(changes: dict[str, Any]) -> None:
-    alone, beside = system(**changes), system(step=changes.get("step", 2e-5))
+    alone = system(**changes)
+    beside = system(step=changes.get("step", 2e-5))
     assert fits(alone) == fits(beside) is not None
     assert [found is None for found in run_together([alone, beside])] == [True, False]
 

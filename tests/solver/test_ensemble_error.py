@@ -73,13 +73,18 @@ def left_out(gap: Floats) -> float:
 
 def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
     """Also where the pad opens at its very end, at which there is one neighbour only, and in its middle."""
-    each, rng, found = system(nodes=64), np.random.default_rng(11), list[tuple[float, float]]()
-    alike, spacing = shared(each, DISTURBED, DISTURBED), 2.0 * each.half_length / each.nodes
+    each = system(nodes=64)
+    rng = np.random.default_rng(11)
+    found = list[tuple[float, float]]()
+    alike = shared(each, DISTURBED, DISTURBED)
+    spacing = 2.0 * each.half_length / each.nodes
     for _ in range(20):
-        o, places = filled([each] * LANES), rng.uniform(-0.01, 0.01, LANES)
+        o = filled([each] * LANES)
+        places = rng.uniform(-0.01, 0.01, LANES)
         for n, x in enumerate(places):
             level = gaps(each, x, 0.0)
-            o.at_x[n], near = x, level[rng.choice([0, 1, 31, 32, 62, 63])]
+            o.at_x[n] = x
+            near = level[rng.choice([0, 1, 31, 32, 62, 63])]
             o.at_y[n] = rng.choice([rng.uniform(level.min(), level.max()), near + 1e-12, near - 1e-12])
         evaluate(o, alike)
         for n, x in enumerate(places):
@@ -95,13 +100,19 @@ def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
 
 def test_an_error_of_the_start_grows_as_the_matrix_exponential_says() -> None:
     """In full contact under waves so small that the motion is linear; steps add little beside such a start."""
-    each, start = shaken(1e-5, 0.05, **TINY), (3e-7, -2e-7)
-    run, a = knowing(each, start), np.zeros((4, 4))
-    c, k, grip = each.coefficients, each.contact_stiffness, each.coefficients.phi * np.sign(each.belt_speed)
+    each = shaken(1e-5, 0.05, **TINY)
+    start = (3e-7, -2e-7)
+    run = knowing(each, start)
+    a = np.zeros((4, 4))
+    c = each.coefficients
+    k = each.contact_stiffness
+    grip = each.coefficients.phi * np.sign(each.belt_speed)
     a[0, 2] = a[1, 3] = 1.0
     a[2] = -np.array([c.c_xx, c.c_xy + grip * k, c.b_xx, c.b_xy]) / c.m
     a[3] = -np.array([c.c_xy, c.c_yy + k, c.b_xy, c.b_yy]) / c.m
-    step, e, exact = expm(a * each.step), np.array([*start, 0.0, 0.0]), []
+    step = expm(a * each.step)
+    e = np.array([*start, 0.0, 0.0])
+    exact = []
     for _ in range(each.steps):
         exact.append(np.abs(e))
         e = step @ e
@@ -118,7 +129,8 @@ def test_it_is_the_true_one(step: float, nodes: int, many: int) -> None:
     Errors by steps are taken to fall with h³. Where the pad does not open they fall with h⁴: 15/7 times too much.
     `SAFETY` times it is promised, so that it has to be more than so small a part of the true one.
     """
-    rng, ratios = np.random.default_rng(21), list[float]()
+    rng = np.random.default_rng(21)
+    ratios = list[float]()
     for _ in range(many):
         each = drawn(rng, step=step, solver__duration=0.05, output__sample_interval=2.5e-4)
         method = replace(each.method, nodes=nodes)
@@ -152,7 +164,8 @@ def test_it_does_not_depend_on_the_lanes_beside_it() -> None:
     strangers = [drawn(rng, solver__duration=0.1) for _ in range(LANES + 5)]
     strangers[3] = system(initial__vy=1e40, solver__duration=0.1)  # leaves its lane at once
     strangers = [replace(each, start_error=(1e-12, 1e-12)) for each in strangers]
-    together, compared = run_together(strangers), 0
+    together = run_together(strangers)
+    compared = 0
     for order in (range(LANES + 4, -1, -1), [5], [7, 3, 7]):
         for place, found in zip(order, run_together([strangers[i] for i in order]), strict=True):
             before = together[place]
@@ -167,7 +180,8 @@ def test_it_does_not_depend_on_the_lanes_beside_it() -> None:
 
 def test_a_motion_that_nearly_sticks_may_have_stuck() -> None:
     """Its sliding velocity comes to nearly nothing: a dip between two steps may hide a stick."""
-    each, known = shaken(5e-5, 0.05, **TINY), {}
+    each = shaken(5e-5, 0.05, **TINY)
+    known = {}
     free = each.coefficients._replace(phi=0.0, b_xx=0.0, b_xy=0.0, b_yy=0.0, c_xy=0.0)
     for part in (0.5, 0.9999):  # of the wheel's speed, which vx comes to again in every cycle
         initial = replace(each.initial, vx=part * each.belt_speed)

@@ -49,7 +49,8 @@ def alone(system: System) -> tuple[Motion, Exponent]:
 
 def eigenvalue(system: System) -> float:
     """The largest real part of an eigenvalue, in slip and full contact, 1/s."""
-    c, k = system.coefficients, system.contact_stiffness
+    c = system.coefficients
+    k = system.contact_stiffness
     grip = c.phi * np.sign(system.belt_speed)
     a = np.zeros((4, 4))
     a[0, 2] = a[1, 3] = 1.0
@@ -124,10 +125,12 @@ def test_between_steep_waves_it_grows_as_neighbours_part() -> None:
     assert (motion.rows[:, 6] == 1.0).all()
     first, other = (replace(each, initial=replace(each.initial, x=way * 1e-7)) for way in (1.0, -1.0))
     change = (alone(first)[0].rows - alone(other)[0].rows)[:, :4]
-    c, k = each.coefficients, each.contact_stiffness
+    c = each.coefficients
+    k = each.contact_stiffness
     springs = np.array([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + k]]) / c.m
     sizes = np.einsum("ti,ij,tj->t", change[:, :2], springs, change[:, :2]) + (change[:, 2:] ** 2).sum(axis=1)
-    time, half = each.interval * np.arange(len(sizes)), len(sizes) // 2
+    time = each.interval * np.arange(len(sizes))
+    half = len(sizes) // 2
     expected = float(np.polyfit(time[half:], 0.5 * np.log(sizes[half:]), 1)[0])
     assert rate == pytest.approx(expected, abs=3.0 * error)
     assert error < 0.1 * abs(expected - eigenvalue(each))
@@ -155,7 +158,8 @@ def test_an_exponent_does_not_depend_on_the_lanes_beside_it() -> None:
     strangers = [replace(drawn(rng, solver__duration=0.1), tangents=True) for _ in range(LANES + 5)]
     away = system(initial__vy=1e40, solver__duration=0.1)  # leaves its lane at once
     strangers[3] = replace(away, tangents=True)
-    together, compared = run_together(strangers), 0
+    together = run_together(strangers)
+    compared = 0
     assert together[3] is None
     for order in (range(LANES + 4, -1, -1), [5], [7, 3, 7]):
         for place, found in zip(order, run_together([strangers[i] for i in order]), strict=True):

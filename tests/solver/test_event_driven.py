@@ -23,7 +23,8 @@ from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, 
 from tests.solver.piecewise_exact import PiecewiseExact
 from tests.solver.solve_ivp_reference import SolveIvp
 
-STICK, SEPARATED = ContactState.STICK, ContactState.SEPARATED
+STICK = ContactState.STICK
+SEPARATED = ContactState.SEPARATED
 
 
 def event_driven(base: dict[str, Any], tolerance: float = 1e-10, **changes: Any) -> Case:
@@ -41,7 +42,8 @@ def error(rows: NDArray[np.float64], exact: NDArray[np.float64]) -> float:
 
 def mirrored(case: dict[str, Any]) -> dict[str, Any]:
     """The same shoe seen from behind: x, the wheel's speed and the angles change sign."""
-    wheel, start = case["wheel"], case["initial"]
+    wheel = case["wheel"]
+    start = case["initial"]
     links = {link: {**case[link], "angle_deg": -case[link]["angle_deg"]} for link in ("link1", "link2")}
     initial = {**start, "x": -start["x"], "vx": -start["vx"]}
     return {**case, **links, "wheel": {**wheel, "angular_speed": -wheel["angular_speed"]}, "initial": initial}
@@ -49,7 +51,9 @@ def mirrored(case: dict[str, Any]) -> dict[str, Any]:
 
 def flat_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, Any], float]:
     """A smooth shoe thrown onto the wheel, and a frequency ω (rad/s): stiffnesses are 0.1 to 10 times m ω²."""
-    omega, m, load = 10 ** rng.uniform(2, 3.5), 10 ** rng.uniform(-1, 2), 10 ** rng.uniform(2, 4)
+    omega = 10 ** rng.uniform(2, 3.5)
+    m = 10 ** rng.uniform(-1, 2)
+    load = 10 ** rng.uniform(2, 4)
     c_1, c_2, k = (m * omega**2 * 10 ** rng.uniform(-1, 1) for _ in range(3))
     b_1, b_2 = (m * omega * 10 ** rng.uniform(-3, -0.5) for _ in range(2))
     size = load / (m * omega**2)
@@ -100,7 +104,10 @@ def test_flat_motions_are_exact_through_stick_and_lift_off(motions: int) -> None
         assert error(result.rows, exact) < 1e-10
         sticks = any(side == 0 and touching for touching, side in reference.visited)
         opens = any(not touching for touching, _ in reference.visited)
-        kept, stuck, opened, both = kept + 1, stuck + sticks, opened + opens, both + (sticks and opens)
+        kept = kept + 1
+        stuck = stuck + sticks
+        opened = opened + opens
+        both = both + (sticks and opens)
     assert kept == motions  # none amplifies that much
     assert stuck >= 0.6 * motions
     assert opened >= 0.8 * motions
@@ -136,7 +143,8 @@ def rough_case(rng: np.random.Generator, tolerance: float) -> tuple[dict[str, An
             "wavelengths": lengths.tolist(),
             "phases_deg": rng.uniform(0, 360, n).tolist(),
         }
-    case["solver"]["duration"], case["output"]["sample_interval"] = 20 / omega, 0.2 / omega
+    case["solver"]["duration"] = 20 / omega
+    case["output"]["sample_interval"] = 0.2 / omega
     return case, omega
 
 
@@ -196,11 +204,14 @@ def test_coulomb_oscillator_comes_to_its_exact_rest() -> None:
 def test_mode_coupling_grows_as_the_eigenvalues_say() -> None:
     # The growing mode alone: stiffness [[2, 1/3], [-1, 2]] has the eigenvalue 2 - i/√3 with (1, -i√3), so
     # x = A exp(γt) cos(ωt), y = √3 A exp(γt) sin(ωt). U is so high that nothing sticks; nothing opens.
-    growth, omega, a = 0.2020717687680948, 1.4285772641803685, 1e-3
+    growth = 0.2020717687680948
+    omega = 1.4285772641803685
+    a = 1e-3
     start = {"initial__x": a, "initial__vx": a * growth, "initial__vy": a * omega * math.sqrt(3.0)}
     result = simulate(event_driven(MODE_COUPLING, 1e-12, solver__duration=30.0, **start))
     rest = simulate(event_driven(MODE_COUPLING, 1e-12, initial__x=0.0, solver__duration=0.01)).rows[0]
-    t, spiral = result.time, a * np.exp(growth * result.time)
+    t = result.time
+    spiral = a * np.exp(growth * result.time)
     assert result.contact_fraction.min() == 1.0
     assert spiral[-1] > 400 * a
     # The equilibrium is at about 200 m: rounding of 200 m, grown by 430, in x of up to 0.4 m.
@@ -343,9 +354,11 @@ def test_a_shoe_without_springs_flies_and_lands() -> None:
         "initial": {"vy": 3.0},
     }
     result = simulate(event_driven(base, 1e-12, solver__duration=6.0, output__sample_interval=0.01))
-    t, omega = result.time, math.sqrt(10.0)
+    t = result.time
+    omega = math.sqrt(10.0)
     turned = 2.0 * (math.pi - math.atan(3.0 / (0.2 * omega))) / omega
-    since, again = t - 3.0, t - 3.0 - turned
+    since = t - 3.0
+    again = t - 3.0 - turned
     landed = -0.2 + 0.2 * np.cos(omega * since) - 3.0 / omega * np.sin(omega * since)
     exact = np.where(since < 0.0, 3.0 * t - t * t, np.where(again < 0.0, landed, 3.0 * again - again**2))
     np.testing.assert_allclose(result.y, exact, atol=1e-11 * 2.25)
@@ -379,7 +392,9 @@ def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
 def test_events_without_progress_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
     state = motion.plant.state
-    state.events, state.events_time = 1000, 1e9  # as if 1000 of them had come, and no time gone by
+    # as if 1000 of them had come, and no time gone by
+    state.events = 1000
+    state.events_time = 1e9
     work = motion.run().work
     assert work.failure is Failure.STALLED
     assert work.steps > 0
@@ -436,7 +451,8 @@ def test_steps_on_nodes_keep_their_tolerance(base: dict[str, Any], tolerance: fl
     The motion may amplify the errors of steps, as in every run of this scheme: twice the tolerance is allowed.
     """
     case = event_driven(base, solver__duration=0.01, output__sample_interval=1e-4)
-    fine, found = on_nodes(case, 1e-11), on_nodes(case, tolerance)
+    fine = on_nodes(case, 1e-11)
+    found = on_nodes(case, tolerance)
     assert error(found.rows, fine.rows) <= 2.0 * tolerance
     assert found.work.evaluators["midpoint"] > 5
     assert abs(found.energy.relative_closing_error) <= tolerance
@@ -459,7 +475,8 @@ def test_nodes_that_all_touch_make_the_motion_of_the_exact_contact(
     """Cell means: the closed form is the sum over the nodes. Both methods have errors of 1e-10 at most."""
     shoe = {**SMALL, "phases_deg": [40.0, 70.0]}  # a wheel without waves, and x = 0, have no angles to tell by
     case = event_driven({**SQUEAL, "initial": start}, roughness__shoe=shoe, **wheel)
-    exact, found = simulate(case), on_nodes(case, 1e-10, 64)
+    exact = simulate(case)
+    found = on_nodes(case, 1e-10, 64)
     assert (0.0 in found.rows[:, list(HISTORY).index("state")]) == ("vx" in start)
     assert set(found.work.evaluators) == set(exact.work.evaluators) == {"closed-form"}
     assert error(found.rows, exact.rows) <= 2e-9
@@ -473,14 +490,17 @@ def test_a_run_on_nodes_may_be_cut_into_blocks_anywhere() -> None:
     system = replace(
         system_of(case), method=Method("event-driven", evaluator="midpoint", nodes=64, tolerance=1e-3)
     )
-    whole, part = Stepping(system).run(first_block=10**6), Stepping(system).run(first_block=1)
+    whole = Stepping(system).run(first_block=10**6)
+    part = Stepping(system).run(first_block=1)
     np.testing.assert_array_equal(whole.rows, part.rows)
 
 
 @pytest.mark.parametrize(("pair", "order", "errors"), [(0, 8, ((THIRD, 3), (FIFTH, 5))), (1, 5, ((FIFTH, 4),))])
 def test_the_tableaus_meet_the_order_conditions_of_quadrature(pair: int, order: int, errors: Any) -> None:
     """Σ b c^q = 1/(q + 1) and Σ a = c; the errors of lower orders vanish below these; t^q is continued exactly."""
-    b, c, upper = A[pair, END_STAGE, : USED[pair]], NODES[pair], DENSE[pair]
+    b = A[pair, END_STAGE, : USED[pair]]
+    c = NODES[pair]
+    upper = DENSE[pair]
     for power in range(order):
         assert b @ c[: USED[pair]] ** power == pytest.approx(1.0 / (power + 1), abs=2e-15)
     np.testing.assert_allclose(A[pair].sum(axis=1), c, atol=2e-15)
@@ -492,7 +512,8 @@ def test_the_tableaus_meet_the_order_conditions_of_quadrature(pair: int, order: 
         k = power * c ** (power - 1)
         for t in (0.2, 0.5, 0.9):
             r = 1.0 - t
-            first, last = (1.0 if power == 1 else 0.0), float(power)
+            first = 1.0 if power == 1 else 0.0
+            last = float(power)
             rows = [1.0, first - 1.0, 2.0 - (first + last), *(upper @ k)]
             value = 0.0
             for p in range(6, -1, -1):

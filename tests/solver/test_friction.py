@@ -21,7 +21,8 @@ signed = st.one_of(st.just(0.0), magnitudes, magnitudes.map(lambda value: -value
 @st.composite
 def problems(draw: st.DrawFn) -> tuple[float, float, float, float, float, float, float]:
     """a11, a12, a22, g1, g2, g0, U with a positive definite: a12² <= 0.98 a11 a22."""
-    a_11, a_22 = draw(magnitudes), draw(magnitudes)
+    a_11 = draw(magnitudes)
+    a_22 = draw(magnitudes)
     a_12 = draw(st.just(0.0) | st.floats(1e-6, 0.99) | st.floats(-0.99, -1e-6)) * math.sqrt(a_11 * a_22)
     return a_11, a_12, a_22, draw(signed), draw(signed), draw(st.just(0.0) | magnitudes), draw(signed)
 
@@ -64,15 +65,18 @@ def golden_section(problem: Problem) -> tuple[float, float, float]:
 
         part = (mpmath.sqrt(5) - 1) / 2
         reach = abs(belt) + 10 * (abs(g_1) + abs(g_2 * a_12 / a_22) + g_0) * a_22 / (a_11 * a_22 - a_12**2) + 1
-        low, high = -reach, reach
+        low = -reach
+        high = reach
         inner = [high - part * (high - low), low + part * (high - low)]
         values = [lowest(inner[0]), lowest(inner[1])]
         while high - low > mpmath.mpf(10) ** -25 * reach:
             if values[0] < values[1]:
-                high, inner = inner[1], [inner[1] - part * (inner[1] - low), inner[0]]
+                high = inner[1]
+                inner = [inner[1] - part * (inner[1] - low), inner[0]]
                 values = [lowest(inner[0]), values[0]]
             else:
-                low, inner = inner[0], [inner[1], inner[0] + part * (high - inner[0])]
+                low = inner[0]
+                inner = [inner[1], inner[0] + part * (high - inner[0])]
                 values = [values[1], lowest(inner[1])]
         d = (low + high) / 2
         return float(d), float(e_of(d)), float(high - low)
@@ -92,7 +96,8 @@ def test_the_minimiser_is_where_a_search_finds_it(problem: Problem) -> None:
 def test_the_subdifferential_holds_zero_at_the_minimiser(problem: Problem) -> None:
     a_11, a_12, a_22, g_1, g_2, g_0, belt = problem
     d, e, side = minimise(*problem)
-    tolerance_d, tolerance_e = rounding(problem), rounding_of_e(problem)
+    tolerance_d = rounding(problem)
+    tolerance_e = rounding_of_e(problem)
     # Rounding in d and e, carried through the gradient, and the gradient's own.
     by_e = abs(a_12) * tolerance_d + a_22 * tolerance_e + 4 * EPS * (abs(a_12 * d) + abs(a_22 * e) + abs(g_2))
     assert a_12 * d + a_22 * e == pytest.approx(g_2, rel=0, abs=by_e)
@@ -141,7 +146,8 @@ def test_the_slopes_are_the_derivatives_by_the_normal_force(problem: Problem, ph
     def at(f: float) -> tuple[float, float, float]:
         return minimise(a_11, a_12, a_22, g_1, g_2 + f, phi * f, belt)
 
-    (d, e, side), (d_next, e_next, side_next) = at(force), at(1.5 * force)
+    d, e, side = at(force)
+    d_next, e_next, side_next = at(1.5 * force)
     assume(side == side_next)
     d_slope, e_slope = slopes(a_11, a_12, a_22, phi, side)
     extreme = (a_11, a_12, a_22, g_1, abs(g_2) + 1.5 * force, 1.5 * phi * force, belt)

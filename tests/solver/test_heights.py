@@ -23,7 +23,9 @@ from brakecli.solver.schemes import QUARTERS
 from tests.examples import ROUGH, make
 from tests.solver.rough_gap import EPS, outputs
 
-A, K, SHOE = 0.05, 5e7, surface([30e-6, 9e-6], wavelengths=[0.02, 0.005], phases_deg=[10.0, 200.0])
+A = 0.05
+K = 5e7
+SHOE = surface([30e-6, 9e-6], wavelengths=[0.02, 0.005], phases_deg=[10.0, 200.0])
 
 
 def wheel_of(waves: int, seed: int = 0, shortest: float = 0.004) -> Surface:
@@ -67,7 +69,8 @@ def test_a_window_gives_the_heights_of_the_sums(waves: int, nodes: int, rows: in
     assert window_rows(wheel, 2 * A / nodes) == rows
     window, sums = both(build_pad(K, A, SHOE, wheel, nodes))
     assert (window.window.rows, sums.window.rows) == (rows, 0)
-    high, low = float(np.abs(wheel.g).sum() + np.abs(SHOE.g).sum()), wheel.omega.max()
+    high = float(np.abs(wheel.g).sum() + np.abs(SHOE.g).sum())
+    low = wheel.omega.max()
     # Rounding: a few units in the last place of heights and of places on the pad, x and the wave, over its length.
     rounding = 8 * EPS * (1.0 + low * (A + 2e-3))
     full = 2 * A * K * np.array([3 * high, 1e-9, low * high, 1e-9, 9 * high**2, 3 * high**2 * low])
@@ -79,7 +82,9 @@ def test_a_window_gives_the_heights_of_the_sums(waves: int, nodes: int, rows: in
 
 
 def test_the_heights_are_those_of_exact_arithmetic_however_far_the_wheel_has_travelled() -> None:
-    wheel, nodes, y = wheel_of(12, seed=4), 64, -3e-5
+    wheel = wheel_of(12, seed=4)
+    nodes = 64
+    y = -3e-5
     layer, _ = both(build_pad(K, A, surface(), wheel, nodes))
     spacing = 2 * A / nodes
     for x, travel in ((0.0, 0.0), (1e-3, 0.37), (-1e-3, -12.3), (2e-4, 1e4 / 3), (2e-4, 1e7 / 3)):
@@ -98,15 +103,18 @@ def test_the_error_of_interpolation_is_bounded_and_the_bound_is_sharp() -> None:
     """By scipy's interpolation of one sine, and by a window whose grid is so wide that it shows."""
     at = np.linspace(0.0, 1.0, 201)
     for turned in (0.2, 0.4):  # rad, from one point to the next
-        points, errors = np.arange(-5, 7), []
+        points = np.arange(-5, 7)
+        errors = []
         for phase in np.linspace(0.0, np.pi, 20):
             polynomial = BarycentricInterpolator(points, np.sin(turned * points + phase))
             errors.append(np.abs(polynomial(at) - np.sin(turned * at + phase)))
         one = Surface(np.ones(1), np.full(1, turned), *np.zeros((3, 1)))
         assert 0.8 < np.max(errors) / interpolation_error(one, 1.0) <= 1.0 + 1e-15 / np.max(errors)
-    wheel, nodes = wheel_of(40, seed=2), 192
+    wheel = wheel_of(40, seed=2)
+    nodes = 192
     pad = build_pad(K, A, surface(), wheel, nodes)
-    pad.constants.rows, wide = 1, interpolation_error(wheel, 2 * A / nodes)
+    pad.constants.rows = 1
+    wide = interpolation_error(wheel, 2 * A / nodes)
     assert 1e-14 < wide / np.abs(wheel.g).sum() < 1e-6
     window, sums = both(pad)
     worst = max(
@@ -128,7 +136,8 @@ def test_a_height_does_not_depend_on_what_was_evaluated_before() -> None:
 @pytest.mark.parametrize("x", [math.nan, math.inf, -1e300, 1e30])
 def test_a_motion_that_runs_away_reads_nothing_outside_the_window(x: float) -> None:
     pad = build_pad(K, A, SHOE, wheel_of(30), 100)
-    used, fresh = both(pad)[0], both(pad)[0]
+    used = both(pad)[0]
+    fresh = both(pad)[0]
     found(used, x, -2e-5, 1.0)
     np.testing.assert_array_equal(found(used, 1e-4, -2e-5, 1.0), found(fresh, 1e-4, -2e-5, 1.0))
 
@@ -155,7 +164,8 @@ METHODS = (
 def test_a_run_is_that_of_sums(method: Method, monkeypatch: pytest.MonkeyPatch) -> None:
     rough = system_of(make(ROUGH, roughness__wheel=MANY, load__force=3000.0))
     rough = replace(rough, method=method, duration=0.005)
-    one, seconds = solve(rough), guessed(rough).seconds
+    one = solve(rough)
+    seconds = guessed(rough).seconds
     assert rough.window_rows > 0
     monkeypatch.setattr(pads, "MOST_SUMMED", 30)
     rough = replace(rough)  # makes its pad anew, as it is too large to be kept

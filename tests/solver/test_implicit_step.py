@@ -40,14 +40,18 @@ class Step:
         guess: float = 0.0,
         **entries: float,
     ) -> None:
-        self.shoe, self.wheel, self.phi, self.k = shoe, wheel, phi, k
+        self.shoe = shoe
+        self.wheel = wheel
+        self.phi = phi
+        self.k = k
         self.evaluate: Any = contact.load(evaluator)
         self.layer = build_layer(self.evaluate, build_pad(k, A, shoe, wheel, 128))
         self.contact = self.layer.contact
         if angles is not None:
             self.layer.angles[:] = angles
         self.given = new(PROBLEM)
-        self.given.phi, self.given.normal_force = phi, guess
+        self.given.phi = phi
+        self.given.normal_force = guess
         for name, value in entries.items():
             self.given[name] = value
         self.problem = self.given.copy()
@@ -118,9 +122,11 @@ def random_steps(
     rng = np.random.default_rng(seed)
     for _ in range(count):
         scale = 10 ** rng.uniform(-9, -3)
-        shoe, wheel = rough(rng, scale), rough(rng, scale)
+        shoe = rough(rng, scale)
+        wheel = rough(rng, scale)
         height = float(shoe.g.sum() + wheel.g.sum()) or scale
-        k, a_22 = 10 ** rng.uniform(2, 14), 10 ** rng.uniform(0, 8)
+        k = 10 ** rng.uniform(2, 14)
+        a_22 = 10 ** rng.uniform(0, 8)
         a_11 = a_22 * rng.uniform(0.5, 2)
         ratio = 10 ** rng.uniform(*stiffness)
         gain = ratio * a_22 / (2 * A * k)
@@ -158,7 +164,8 @@ def test_both_iterations_agree_where_both_converge(evaluator: str, steps: int) -
         if contraction > 0.8:
             continue
         outcome, _, rising = step.run(newton)
-        by_newton, valid = step.force, step.contact.valid
+        by_newton = step.force
+        valid = step.contact.valid
         paper, evaluations, _ = step.run(fixed_point, MOST_EVALUATIONS["fixed-point"])
         assert (outcome, rising, paper) == (SOLVED, 0, SOLVED)
         assert evaluations <= 2 + math.log(1e-16) / math.log(max(contraction, 1e-16)) + 1 or step.noise() > 0
@@ -175,7 +182,8 @@ def test_newton_solves_every_step_from_any_guess(seed: int) -> None:
     """A solution always exists: F_y >= 0 at F = 0, and as F grows either the shoe slips and is lifted off, or it
     sticks (phi a22 > |a12|) and is lifted off. The residual at the answer is rounding.
     """
-    rng, touching = np.random.default_rng(seed), 0
+    rng = np.random.default_rng(seed)
+    touching = 0
     for _, step in random_steps(seed, 700, (-4.0, 4.0), coupling=0.95):
         guess = 0.0 if rng.random() < 0.2 else 2 * A * step.k * step.crest * 10 ** rng.uniform(-3, 1)
         step.given.normal_force = guess
@@ -195,7 +203,8 @@ def test_newton_takes_few_evaluations_from_a_force_nearby(off: float, mean: floa
     """As from the force of the step before. Above all it must not fall back to halving while it converges from one
     side, which leaves the other side of the bracket where it was (22 to 28 evaluations then).
     """
-    rng, taken = np.random.default_rng(35), []
+    rng = np.random.default_rng(35)
+    taken = []
     for _, step in random_steps(35, 600, (-3.0, 3.7), coupling=0.1):
         assert step.run()[0] == SOLVED
         if step.force == 0.0:
@@ -214,7 +223,9 @@ def test_newton_takes_few_evaluations_from_a_force_nearby(off: float, mean: floa
 )
 def test_a_force_that_is_taken_without_evaluating_it_solves_the_step(evaluator: str) -> None:
     """Places of the gap that begin or cease to touch, sides that change and wheels that are steep forbid it."""
-    rng, taken, evaluated = np.random.default_rng(40), 0, 0
+    rng = np.random.default_rng(40)
+    taken = 0
+    evaluated = 0
     for _, step in random_steps(40, 1200, (-4.0, 1.0), evaluator=evaluator):
         if step.run()[0] != SOLVED or step.force == 0.0 or not step.contact.valid:
             continue
@@ -234,11 +245,13 @@ def test_a_force_that_is_taken_without_evaluating_it_solves_the_step(evaluator: 
 def test_every_step_of_a_run_meets_the_tolerance_with_one_evaluation_in_most(scheme: str) -> None:
     """A pad that opens and closes: the contact evaluated again where each step has put the shoe."""
     system = system_of(make(ROUGH, solver__scheme=scheme))
-    run, found = Stepping(system), new(CONTACT)
+    run = Stepping(system)
+    found = new(CONTACT)
     open_steps = 0
     for level in range(int(run.counts.level) + 1, 701):
         run.block(level)
-        p, layer = run.plant.problem, run.plant.layer._replace(contact=found)
+        p = run.plant.problem
+        layer = run.plant.layer._replace(contact=found)
         system.evaluate(p.x_0 + p.gain * p.d, p.y_0 + p.gain * p.e, layer)
         rounding = 4 * EPS * found.stiffness * (abs(p.y_0) + abs(p.gain * p.e))
         assert (
@@ -256,8 +269,10 @@ def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float)
     """A flat pad under a given approach: F = 2ak (depth - gain F/a22)+ with e's own part known, so that
     F = 2ak depth/(1 + ratio). The paper's iteration multiplies an error by -ratio and jumps between two forces.
     """
-    k, a_22 = 1e8, 1e6
-    gain, stiffness = ratio * a_22 / (2 * A * k), 2 * A * k
+    k = 1e8
+    a_22 = 1e6
+    gain = ratio * a_22 / (2 * A * k)
+    stiffness = 2 * A * k
     step = Step(k=k, phi=phi, a_11=1e6, a_22=a_22, gain=gain, y_0=-1e-5, evaluator="closed-form", guess=5.0)
     outcome, evaluations, rising = step.run()
     assert (outcome, rising) == (SOLVED, 0)
@@ -379,7 +394,8 @@ def test_a_wedge_has_three_solutions_of_which_one_is_found() -> None:
     residuals = np.array([step.force_at(f) - f for f in forces])
     roots = 1 + int(np.count_nonzero(np.diff(residuals[1:] > 0)))  # F = 0 is one of them
     assert (residuals[0], roots) == (0.0, 3)
-    found, risen = set(), 0
+    found = set()
+    risen = 0
     for guess in (0.0, 1.0, 1.75, 3.0, 50.0, 1e3, 1e6):
         step.given.normal_force = guess
         outcome, _, rising = step.run()
@@ -397,11 +413,13 @@ def test_the_reported_slope_is_the_residual_s_derivative() -> None:
     for _, step in random_steps(39, 200, (-2.0, 1.0), evaluator="exact"):
         if step.run()[0] != SOLVED or step.force == 0.0:
             continue
-        p, c = step.problem, step.contact
+        p = step.problem
+        c = step.contact
         slope = p.gain * (c.tangential * p.d_slope - c.stiffness * p.e_slope)
         eta = 1e-5 * step.force
         sides = [step.force_at(step.force + s * eta) for s in (-1.0, 0.0, 1.0)]
-        backward, forward = (sides[1] - sides[0]) / eta, (sides[2] - sides[1]) / eta
+        backward = (sides[1] - sides[0]) / eta
+        forward = (sides[2] - sides[1]) / eta
         # Where the two one-sided quotients agree there is no kink nearby, and they bound the derivative.
         spread = abs(forward - backward)
         if spread > 1e-3 * abs(slope):

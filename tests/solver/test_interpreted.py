@@ -36,7 +36,8 @@ def case(scheme: str, evaluator: str) -> dict[str, Any]:
     full = evaluator == "closed-form" and not smooth
     wheel: dict[str, Any] = {"amplitudes": [2e-5, 1e-5], "wavelengths": [0.013, 0.004]}
     if evaluator == "window":  # many waves
-        wheel, evaluator = {"amplitudes": [2.5e-6] * 12, "wavelengths": [0.001 * n for n in range(4, 16)]}, "auto"
+        wheel = {"amplitudes": [2.5e-6] * 12, "wavelengths": [0.001 * n for n in range(4, 16)]}
+        evaluator = "auto"
     return {
         "shoe": {"mass": 0.1},
         "wheel": {"radius": 0.5, "times": [0.0, 5e-4], "angular_speeds": [0.1, 0.3]},
@@ -75,8 +76,10 @@ def histories() -> dict[str, NDArray[np.float64]]:
     found = {}
     for scheme, evaluator in PAIRS:
         motion = solve(replace(system_of(Case.model_validate(case(scheme, evaluator))), tracked=True))
-        work, name = motion.work, f"{scheme} {evaluator}"
-        found[name], track = motion.rows, motion.track
+        work = motion.work
+        name = f"{scheme} {evaluator}"
+        found[name] = motion.rows
+        track = motion.track
         assert track is not None
         found[f"{name} track"] = np.concatenate(
             [each.ravel() for each in (*track.kept, track.times, track.works, track.stored)]

@@ -28,7 +28,8 @@ def test_the_coefficients_are_the_energy_of_the_links(
     c = links(c_1, b_1, beta, c_2, b_2, alpha)
     r = np.array([math.cos(math.radians(towards)), math.sin(math.radians(towards))])
     # Link 1 leans by beta from the vertical (y) towards x; link 2 leads away along x and rises by alpha against x.
-    u_1, u_2 = rotated((0.0, 1.0), -beta), rotated((1.0, 0.0), -alpha)
+    u_1 = rotated((0.0, 1.0), -beta)
+    u_2 = rotated((1.0, 0.0), -alpha)
     for one, two, xx, xy, yy in ((c_1, c_2, c.c_xx, c.c_xy, c.c_yy), (b_1, b_2, c.b_xx, c.b_xy, c.b_yy)):
         energy = 0.5 * one * float(u_1 @ r) ** 2 + 0.5 * two * float(u_2 @ r) ** 2
         quadratic = 0.5 * (xx * r[0] ** 2 + 2 * xy * r[0] * r[1] + yy * r[1] ** 2)
@@ -42,7 +43,8 @@ def test_the_coefficients_are_the_energy_of_the_links(
 
 def rotated(u: tuple[float, float], degrees: float) -> NDArray[np.float64]:
     """The vector turned anticlockwise."""
-    sine, cosine = math.sin(math.radians(degrees)), math.cos(math.radians(degrees))
+    sine = math.sin(math.radians(degrees))
+    cosine = math.cos(math.radians(degrees))
     return np.array([cosine * u[0] - sine * u[1], sine * u[0] + cosine * u[1]])
 
 
@@ -51,7 +53,9 @@ def rotated(u: tuple[float, float], degrees: float) -> NDArray[np.float64]:
 def test_upright_and_level_links_decouple_exactly(beta: float, alpha: float) -> None:
     c = links(1e7, 300.0, beta, 2e7, 500.0, alpha)
     assert (c.c_xy, c.b_xy) == (0.0, 0.0)
-    level_1, level_2 = abs(beta) == 90, abs(alpha) == 0  # which link acts along x
+    # which link acts along x
+    level_1 = abs(beta) == 90
+    level_2 = abs(alpha) == 0
     assert c.c_xx == 1e7 * level_1 + 2e7 * level_2
     assert c.c_yy == 1e7 * (not level_1) + 2e7 * (not level_2)
     assert c.b_xx == 300 * level_1 + 500 * level_2

@@ -164,7 +164,8 @@ def test_three_layer_scheme_tells_stick_by_its_cycles_not_by_its_flicker(step: f
         "output__sample_interval": 2e-5,
         "friction__coefficient": 0.7,
     }
-    fractions, episodes = [], []
+    fractions = []
+    episodes = []
     for scheme, theta in SCHEMES:
         result = simulate(make(SQUEAL, solver__scheme=scheme, solver__theta=theta, **changes))
         stick = result.state[result.time > 0.2] == 0

@@ -46,7 +46,9 @@ def smooth_reference(
     system: System, start: NDArray[np.float64], times: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """The same motion by a Runge-Kutta method of order eight, with (2) of full contact and (6)-(7) written out."""
-    c, wheel, k = system.coefficients, system.wheel, system.contact_stiffness
+    c = system.coefficients
+    wheel = system.wheel
+    k = system.contact_stiffness
     sinc = np.sinc(wheel.omega * 0.05 / np.pi)
 
     def slope(t: float, z: NDArray[np.float64]) -> list[float]:
@@ -109,7 +111,9 @@ def test_two_layer_scheme_keeps_second_order_through_stick_slip() -> None:
     x, y, v_x, v_y = settled.rows[slipping, :4]
     start = {"initial__x": x, "initial__y": y, "initial__vx": v_x, "initial__vy": v_y}
     steps = [4e-5, 2e-5, 1e-5, 5e-6, 2.5e-6, 1.25e-6]
-    errors, exact, stick = [], None, 0
+    errors = []
+    exact = None
+    stick = 0
     for step in steps:
         case = make(
             SQUEAL,

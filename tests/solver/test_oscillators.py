@@ -64,7 +64,8 @@ def test_mode_coupling_grows_at_the_published_rate_and_frequency(scheme: str, th
 def test_mode_coupling_grows_only_above_its_critical_friction(phi: float, grows: bool) -> None:
     result = simulate(make(MODE_COUPLING, friction__coefficient=phi, solver__duration=150.0))
     motion = np.abs(result.vx)
-    early, late = motion[:6000].max(), motion[-6000:].max()
+    early = motion[:6000].max()
+    late = motion[-6000:].max()
     assert (late > 10.0 * early) == grows
     assert late < 1.01 * early or grows
 
@@ -78,8 +79,10 @@ def test_without_friction_the_motion_is_the_matrix_exponential() -> None:
         initial__vy=0.01,
         solver__step=1e-6,
     )
-    system, result = system_of(case), simulate(case)
-    c, k = system.coefficients, system.contact_stiffness
+    system = system_of(case)
+    result = simulate(case)
+    c = system.coefficients
+    k = system.contact_stiffness
     a = np.zeros((4, 4))
     a[:2, 2:] = np.eye(2)
     a[2:] = -np.array([[c.c_xx, c.c_xy, c.b_xx, c.b_xy], [c.c_xy, c.c_yy + k, c.b_xy, c.b_yy]]) / c.m

@@ -19,7 +19,8 @@ from tests.solver.piecewise_exact import PiecewiseExact
 from tests.solver.test_event_driven import error, flat_case, mirrored
 
 EXACT = Method("piecewise-exact")
-SUITE, CAMPAIGN = 8, 200
+SUITE = 8
+CAMPAIGN = 200
 
 
 def motion(case: Case | dict[str, Any], method: Method = EXACT) -> Motion:
@@ -37,7 +38,8 @@ def tabled(base: dict[str, Any], **changes: Any) -> Case:
 
 def same_as_event_driven(case: Case | dict[str, Any], bound: float) -> Motion:
     """The motion, if the event-driven scheme finds the same samples, states and works within a relative bound."""
-    found, other = motion(case), motion(case, Method("event-driven", tolerance=1e-13))
+    found = motion(case)
+    other = motion(case, Method("event-driven", tolerance=1e-13))
     moving = np.abs(other.rows[:, :4]).max(axis=0) > 0.0
     np.testing.assert_array_equal(found.rows[:, :4][:, ~moving], 0.0)
     scale = np.where(moving, np.abs(other.rows[:, :4]).max(axis=0), 1.0)
@@ -69,10 +71,13 @@ def test_a_phase_is_a_matrix_exponential(state: float) -> None:
     changes = {"wheel__angular_speed": None, "load__force": None, "solver__duration": 0.02, **RAMPS}
     changes |= {"initial__vx": 0.05, "initial__y": -4e-4} if state == 0.0 else {"initial__y": -1e-4}
     case = tabled(SQUEAL, **{**changes, **PHASES[state]})
-    found, system = motion(case), system_of(case)
+    found = motion(case)
+    system = system_of(case)
     assert set(found.rows[:, 7]) == {state}
-    c, k = system.coefficients, system.contact_stiffness if state != 2.0 else 0.0
-    belt, load = system.belt[0], system.load[0]
+    c = system.coefficients
+    k = system.contact_stiffness if state != 2.0 else 0.0
+    belt = system.belt[0]
+    load = system.load[0]
     a = np.zeros((8, 8))  # of x, y, vx, vy, U, U', Q, Q'
     a[0, 2] = a[1, 3] = a[4, 5] = a[6, 7] = 1.0
     a[3] = np.array([-c.c_xy, -c.c_yy - k, -c.b_xy, -c.b_yy, 0, 0, -c.cos_beta, 0]) / c.m
@@ -101,11 +106,9 @@ def drawn(rng: np.random.Generator, kind: int) -> dict[str, Any]:
         for link in links:
             link["damping"] = 0.0
     elif kind == 3:  # speed and load change, and the wheel turns back
-        load, belt, times = (
-            case["load"]["force"],
-            case["wheel"]["angular_speed"],
-            np.sort(rng.uniform(0, 30, 4)) / omega,
-        )
+        load = case["load"]["force"]
+        belt = case["wheel"]["angular_speed"]
+        times = np.sort(rng.uniform(0, 30, 4)) / omega
         case["load"] = {"times": times.tolist(), "forces": (load * rng.uniform(-0.3, 2, 4)).tolist()}
         case["wheel"] = {
             "radius": 0.5,
@@ -113,14 +116,16 @@ def drawn(rng: np.random.Generator, kind: int) -> dict[str, Any]:
             "angular_speeds": (belt * rng.normal(size=4)).tolist(),
         }
     elif kind == 4:  # links along the axes
-        links[0]["angle_deg"], links[1]["angle_deg"] = rng.choice([-90, 0, 90]), rng.choice([-90, 0, 90])
+        links[0]["angle_deg"] = rng.choice([-90, 0, 90])
+        links[1]["angle_deg"] = rng.choice([-90, 0, 90])
     return case
 
 
 @pytest.mark.parametrize("many", counts(SUITE, CAMPAIGN))
 def test_random_shoes_move_as_by_the_event_driven_scheme(many: int) -> None:
     """Rounding errors of some 1e-15 a step, of two solutions, in motions that amplify them by up to 1e4."""
-    rng, seen = np.random.default_rng(31), set[float]()
+    rng = np.random.default_rng(31)
+    seen = set[float]()
     for number in range(many):
         seen |= set(same_as_event_driven(drawn(rng, number % 5), 1e-10).rows[:, 7])
     assert seen == {-1.0, 0.0, 1.0, 2.0}
@@ -229,7 +234,8 @@ def test_a_touch_within_a_step_is_not_passed_over(gap: float) -> None:
         "initial": {"at": "equilibrium", "x": 1.0 + gap},
     }
     case = tabled(base, solver__duration=20.0, output__sample_interval=0.01)
-    found, other = motion(case), motion(case, Method("event-driven", tolerance=1e-12))
+    found = motion(case)
+    other = motion(case, Method("event-driven", tolerance=1e-12))
     np.testing.assert_allclose(found.rows[:, [0, 2]], other.rows[:, [0, 2]], rtol=0.0, atol=1e-10)
     assert found.work.steps > system_of(case).samples if gap > 0.0 else found.work.steps == system_of(case).samples
 
@@ -252,7 +258,8 @@ def test_a_shoe_without_springs_flies_and_lands() -> None:
     none = {"link1__stiffness": 0.0, "link2__stiffness": 0.0, "initial": {"vy": 3.0}}
     base = {**COULOMB, "initial": none.pop("initial"), "load": {"force": 2.0}}
     rows = motion(tabled(base, solver__duration=4.0, output__sample_interval=0.01, **none)).rows
-    t, omega = 0.01 * np.arange(len(rows)), math.sqrt(10.0)
+    t = 0.01 * np.arange(len(rows))
+    omega = math.sqrt(10.0)
     landed = -0.2 + 0.2 * np.cos(omega * (t - 3.0)) - 3.0 / omega * np.sin(omega * (t - 3.0))
     np.testing.assert_allclose(rows[:, 1], np.where(t < 3.0, 3.0 * t - t * t, landed), atol=1e-13 * 2.25)
     assert set(rows[:, 7]) == {ContactState.SEPARATED, ContactState.STICK}  # x rests on a wheel at rest
@@ -261,14 +268,16 @@ def test_a_shoe_without_springs_flies_and_lands() -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_the_mirror_image_of_a_motion_is_a_motion(seed: int) -> None:
     case, _ = flat_case(np.random.default_rng(seed), 1e-10)
-    one, other = motion(case).rows, motion(mirrored(case)).rows
+    one = motion(case).rows
+    other = motion(mirrored(case)).rows
     np.testing.assert_array_equal(other[:, [1, 3, 5, 6]], one[:, [1, 3, 5, 6]])
     np.testing.assert_array_equal(other[:, [0, 2, 4]], -one[:, [0, 2, 4]])
 
 
 def test_a_run_may_be_cut_into_blocks_anywhere() -> None:
     case = tabled(SQUEAL, solver__duration=0.02, output__sample_interval=1e-3)
-    whole, parts = motion(case), Stepping(replace(system_of(case), method=EXACT))
+    whole = motion(case)
+    parts = Stepping(replace(system_of(case), method=EXACT))
     assert parts.system.per_sample > 1
     rows = [parts.block(stop) for stop in range(1, parts.system.steps + 1)]
     np.testing.assert_array_equal(np.concatenate(rows), whole.rows[:-1])

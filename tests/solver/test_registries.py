@@ -58,7 +58,8 @@ def test_a_small_scheme_and_a_small_evaluator_go_through_check_run_and_compare_s
 def test_the_small_ones_agree_with_those_of_the_solver(case: str) -> None:
     own = make(SQUEAL, solver__scheme="backward-euler", contact__evaluator="spring")
     same = make(SQUEAL, solver__theta=(1.0, 1.0))  # two-layer with these weights is backward Euler
-    one, other = simulate(own).rows[:, :6], simulate(same).rows[:, :6]
+    one = simulate(own).rows[:, :6]
+    other = simulate(same).rows[:, :6]
     np.testing.assert_allclose(one, other, rtol=0.0, atol=1e-9 * np.abs(other).max(axis=0).max())
 
 

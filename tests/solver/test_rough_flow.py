@@ -80,17 +80,22 @@ def test_the_derivative_is_that_of_differences(many: int) -> None:
 
     Its rounding is 1e-10, its square 1e-12. A kink of the force's second derivative adds at most 1e-6.
     """
-    kinds, compared = Counter[str](), 0
+    kinds = Counter[str]()
+    compared = 0
     for seed in range(many):
         system, state, span, rng = rough_shoe(seed)
         if stuck := rng.random() < 0.3:
             state[2] = system.belt_speed
-        flow, size = RoughFlow(system, int(rng.choice([60, 96, 130]))), scales(system)
-        steps, begin = default_steps(system, span), float(rng.uniform(0.0, 1.0))
+        flow = RoughFlow(system, int(rng.choice([60, 96, 130])))
+        size = scales(system)
+        steps = default_steps(system, span)
+        begin = float(rng.uniform(0.0, 1.0))
         found = flow(state, begin, span, steps)
         assert found.status is Status.DONE
         assert found.derivative is not None
-        derivative, differences, words = found.derivative * size / size[:, None], np.zeros((4, 4)), {found.word}
+        derivative = found.derivative * size / size[:, None]
+        differences = np.zeros((4, 4))
+        words = {found.word}
         for i in range(4):
             if i == 2 and stuck and found.word[0] == STICK:  # disturbed, it slips for a moment
                 continue
@@ -119,7 +124,8 @@ def test_without_the_derivative_the_end_is_the_same() -> None:
 def test_the_velocity_is_that_of_differences_in_the_span() -> None:
     """With equal steps, whose number grows with the span, to the error of the steps."""
     system, state, span, _ = rough_shoe(2)
-    flow, steps = RoughFlow(system), 400
+    flow = RoughFlow(system)
+    steps = 400
     found = flow(state, 0.0, span, steps)
     ends = [flow(state, 0.0, span * (steps + n) / steps, steps + n, tangents=False).state for n in (-1, 1)]
     slope = (ends[1] - ends[0]) / (2.0 * span / steps)
@@ -131,7 +137,8 @@ def test_the_velocity_is_that_of_differences_in_the_span() -> None:
 
 def errors_of(system: System, state: Array, span: float, tries: list[tuple[int, int]]) -> list[float]:
     """Errors of the end, in sizes, with some cells and so many times the default steps."""
-    end, found = event_driven(system, state, span, 1).rows[-1, :4], []
+    end = event_driven(system, state, span, 1).rows[-1, :4]
+    found = []
     for cells, finer in tries:
         steps = finer * default_steps(system, span)
         flown = RoughFlow(system, cells)(state, 0.0, span, steps, tangents=False)
@@ -165,13 +172,16 @@ def test_the_end_comes_to_that_of_the_event_driven_scheme(many: int) -> None:
 def test_a_smooth_pad_that_touches_is_a_matrix_exponential(side: float) -> None:
     case = make(SQUEAL, wheel__angular_speed=side * 2.0, solver__step=1e-5)
     system = system_of(case)
-    c, k, grip = system.coefficients, system.contact_stiffness, side * system.coefficients.phi
+    c = system.coefficients
+    k = system.contact_stiffness
+    grip = side * system.coefficients.phi
     stiffness = np.array([[c.c_xx, c.c_xy + grip * k], [c.c_xy, c.c_yy + k]])
     damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
     matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness / c.m, -damping / c.m]])
     load = system.load_at_start * np.array([c.sin_beta, c.cos_beta])
     rest = np.append(np.linalg.solve(stiffness, -load), [0.0, 0.0])
-    size, span = scales(system), 3.0 / system.natural_frequencies[1]
+    size = scales(system)
+    span = 3.0 / system.natural_frequencies[1]
     change = 0.1 * size * np.array([1.0, -0.5, 0.3, 0.7])
     found = RoughFlow(system, 2)(rest + change, 0.0, span, 2000)
     expected = expm(matrix * span)
@@ -186,7 +196,9 @@ def test_a_smooth_pad_that_touches_is_a_matrix_exponential(side: float) -> None:
 def test_a_common_period_later_everything_is_the_same() -> None:
     for seed in (0, 1, 2, 7, 8, 12):
         system, state, span, _ = rough_shoe(seed)
-        flow, steps, period = RoughFlow(system), default_steps(system, span), common_period(system)
+        flow = RoughFlow(system)
+        steps = default_steps(system, span)
+        period = common_period(system)
         assert period is not None, seed
         one, other, third = (
             flow(state, begin, span, steps) for begin in (0.02, 0.02 + period, 0.02 + 0.4 * period)
@@ -204,15 +216,20 @@ def test_the_force_of_a_pad_that_touches_everywhere_is_exact(cells: int, deeper:
     waves = {"amplitudes": [3e-5, 2e-5], "wavelengths": [0.03, 0.011], "phases_deg": [40.0, -75.0]}
     shoe = {"amplitudes": [2e-5], "wavelengths": [0.019], "phases_deg": [65.0]}
     system = system_of(make(ROUGH, roughness__wheel=waves, roughness__shoe=shoe))
-    c, a, time = system.coefficients, system.half_length, 0.705
-    x, y = 1e-5, -deeper * 7e-5  # the crests make 7e-5 m; a little less is not proved to touch, but it does
+    c = system.coefficients
+    a = system.half_length
+    time = 0.705
+    # the crests make 7e-5 m; a little less is not proved to touch, but it does
+    x = 1e-5
+    y = -deeper * 7e-5
     found = RoughFlow(system, cells)(np.array([x, y, 0.0, 0.0]), time, 1e-15, 1)
     assert found.margins.contact == pytest.approx(1.0, abs=1e-15)
     gap = -y
     for sign, surface, at in ((1.0, system.wheel, x - system.belt_speed * time), (-1.0, system.shoe, 0.0)):
         mean = np.sin(surface.omega * a) / (surface.omega * a)
         gap += sign * float(np.sum(surface.g * mean * np.sin(surface.omega * at + surface.phase)))
-    along, across = c.phi * system.contact_stiffness * gap, system.contact_stiffness * gap
+    along = c.phi * system.contact_stiffness * gap
+    across = system.contact_stiffness * gap
     load = system.load_at_start
     along -= c.c_xx * x + c.c_xy * y + load * c.sin_beta
     across -= c.c_xy * x + c.c_yy * y + load * c.cos_beta
@@ -222,7 +239,8 @@ def test_the_force_of_a_pad_that_touches_everywhere_is_exact(cells: int, deeper:
 def test_two_spans_are_one_after_the_other() -> None:
     system, state, span, _ = rough_shoe(3)
     flow = RoughFlow(system)
-    whole, half = flow(state, 0.3, span, 4000), flow(state, 0.3, 0.5 * span, 2000)
+    whole = flow(state, 0.3, span, 4000)
+    half = flow(state, 0.3, 0.5 * span, 2000)
     rest = flow(half.state, 0.3 + 0.5 * span, 0.5 * span, 2000)
     size = scales(system)
     np.testing.assert_allclose(rest.state / size, whole.state / size, atol=1e-9)
@@ -237,9 +255,11 @@ def test_time_does_not_enter_on_a_smooth_wheel() -> None:
     shoe = ROUGH["roughness"]["shoe"]
     system = system_of(make(ROUGH, roughness__wheel=None, wheel__angular_speed=0.05))
     assert system.shoe.g.size == len(shoe["amplitudes"])
-    size, span = scales(system), 4.0 / system.natural_frequencies[1]
+    size = scales(system)
+    span = 4.0 / system.natural_frequencies[1]
     state = size * np.array([-0.1, -1.0, 0.5, -0.4])
-    flow, end = RoughFlow(system, 400), event_driven(system, state, span, 1).rows[-1, :4]
+    flow = RoughFlow(system, 400)
+    end = event_driven(system, state, span, 1).rows[-1, :4]
     one, other = (flow(state, begin, span, 800) for begin in (0.0, 0.37))
     np.testing.assert_array_equal(one.state, other.state)
     np.testing.assert_allclose(one.state / size, end / size, atol=1e-5)
@@ -263,7 +283,8 @@ def slow() -> tuple[System, Array, float]:
 
 def test_word_and_times_are_those_of_the_event_driven_scheme() -> None:
     system, state, span = slow()
-    found, samples = RoughFlow(system, 200)(state, 0.0, span, 1000), 20_000
+    found = RoughFlow(system, 200)(state, 0.0, span, 1000)
+    samples = 20_000
     motion = event_driven(system, state, span, samples)
     phases = np.array([STATES[int(each)] for each in motion.rows[:, 7]])
     after = np.flatnonzero(np.diff(phases)) + 1
@@ -275,7 +296,9 @@ def test_word_and_times_are_those_of_the_event_driven_scheme() -> None:
 def check_margins(found: Flown, system: System, rows: Array) -> None:
     """Margins and extremes are those of many samples, each of which misses its least value by its curvature."""
     x, y, v_x, _, friction, normal, fraction, phase = rows.T
-    size, slip, stick = scales(system), np.abs(v_x - system.belt_speed), phase == 0.0
+    size = scales(system)
+    slip = np.abs(v_x - system.belt_speed)
+    stick = phase == 0.0
     np.testing.assert_allclose(found.x, [x.min(), x.max()], atol=2e-5 * size[0])
     np.testing.assert_allclose(found.y, [y.min(), y.max()], atol=2e-5 * size[1])
     if found.word in ((BACKWARD,), (FORWARD,)):
@@ -300,7 +323,9 @@ def test_margins_are_those_of_samples() -> None:
         check_margins(found, system, event_driven(system, state, span, 2000, 1e-9).rows)
     assert len(words) > 2
     system, state, span = slow()
-    c, belt, span = system.coefficients, system.belt_speed, 5e-4
+    c = system.coefficients
+    belt = system.belt_speed
+    span = 5e-4
     state[[0, 2]] = -(c.c_xy * state[1] + c.b_xx * belt) / c.c_xx, belt  # no friction is needed
     found = RoughFlow(system, 200)(state, 0.0, span, 400)
     assert found.word == (STICK,)
@@ -325,8 +350,10 @@ def flying(**changes: Any) -> System:
 
 def test_statuses_say_why_a_flow_has_no_end() -> None:
     system = flying(link1__damping=0.0, link2__damping=0.0)
-    flow, size = RoughFlow(system), np.array([1e-3, 1e-3, 1.0, 1.0])
-    state, period = size * np.array([1.0, 1.0, 0.5, 0.0]), 1.0 / system.natural_frequencies[1]
+    flow = RoughFlow(system)
+    size = np.array([1e-3, 1e-3, 1.0, 1.0])
+    state = size * np.array([1.0, 1.0, 0.5, 0.0])
+    period = 1.0 / system.natural_frequencies[1]
     assert flow(state, 0.0, period, 40).status is Status.DONE
     for tangents in (True, False):
         assert flow(state, 0.0, 400.0 * period, 16_000, tangents).status is Status.TOO_MANY_EVENTS
@@ -349,8 +376,10 @@ def test_what_the_flow_cannot_do_is_refused() -> None:
 def test_no_flow_of_a_random_shoe_fails(many: int) -> None:
     """Neither do phases that begin and end within one step pile up, nor do they graze."""
     for seed, tables in enumerate(islice(random_shoes("open", 1), many)):
-        system, rng = system_of(Case.model_validate(tables)), np.random.default_rng(seed)
-        fast, passing = system.natural_frequencies[1], system.passing_frequency
+        system = system_of(Case.model_validate(tables))
+        rng = np.random.default_rng(seed)
+        fast = system.natural_frequencies[1]
+        passing = system.passing_frequency
         span = min(20.0 / fast, 1500.0 / max(passing, fast))
         start = np.array([system.initial.x, system.initial.y, system.initial.vx, system.initial.vy])
         state = start + np.abs(scales(system)) * rng.normal(size=4)

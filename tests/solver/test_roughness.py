@@ -105,7 +105,8 @@ def test_the_wheel_s_phases_stay_exact_over_ten_thousand_kilometres(
 
 SHOE = ((12e-6, 0.02, 10.0), (-7e-6, 0.0071, 200.0))
 WHEEL = ((20e-6, 0.025, 0.0), (9e-6, 0.0113, 30.0), (5e-6, 0.0037, 311.0))
-A, K = 0.03, 3e8
+A = 0.03
+K = 3e8
 
 
 def travelled(times: list[float], speeds: list[float], radius: float, t: Fraction) -> Fraction:
@@ -159,10 +160,12 @@ def exact_force(numbers: list[Any], x: float, y: float, way: Fraction) -> Any:
 def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
     evaluator: str, t_low: float, times: list[float], speeds: list[float], t: float, by_number: bool
 ) -> None:
-    radius, x = 1.1037, 3.21e-5
+    radius = 1.1037
+    x = 3.21e-5
     y = -8e-5 if evaluator == "closed-form" else -4.3e-6
     given_numbers = [2 * math.pi / length for _, length, _ in WHEEL]
-    g, phase = [each[0] for each in WHEEL], [each[2] for each in WHEEL]
+    g = [each[0] for each in WHEEL]
+    phase = [each[2] for each in WHEEL]
     if by_number:
         wheel = surface(g, wavenumbers=given_numbers, phases_deg=phase)
         numbers = [mpf(number) for number in given_numbers]
@@ -183,7 +186,8 @@ def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
         way = travelled(times, speeds, radius, time)
     else:  # between the last knots but one and two
         reached = next(i for i in range(len(times)) if Fraction(times[i + 1]) >= time)
-        start, v = Fraction(times[reached]), Fraction(speeds[reached]) * Fraction(radius)
+        start = Fraction(times[reached])
+        v = Fraction(speeds[reached]) * Fraction(radius)
         w = Fraction(speeds[reached + 1]) * Fraction(radius)
         slope = (w - v) / (Fraction(times[reached + 1]) - start)
         way = travelled(times[: reached + 1], speeds[: reached + 1], radius, start)
@@ -203,7 +207,8 @@ def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
 def test_whole_waves_bring_the_phases_back(turns: int) -> None:
     """A travel of whole wavelengths, 1/64 m each, is a double: the angles return to the bit."""
     wheel = surface([1e-6, 1e-6], wavelengths=[1 / 64, 1 / 32], phases_deg=[10.0, 20.0])
-    start, later = np.zeros(2), np.zeros(2)
+    start = np.zeros(2)
+    later = np.zeros(2)
     wheel_angles(wheel.waves, 0.0, 0.0, start)
     wheel_angles(wheel.waves, 2 * turns / 64, 0.0, later)
     np.testing.assert_array_equal(later, start)

@@ -90,7 +90,8 @@ def exact_value(given: Given, t: Fraction) -> Fraction:
 
 def exact_integral(given: Given, t: Fraction) -> Fraction:
     """The integral from 0 to t: trapezia between all the knots on the way."""
-    low, high = min(t, Fraction(0)), max(t, Fraction(0))
+    low = min(t, Fraction(0))
+    high = max(t, Fraction(0))
     cuts = [low, *(Fraction(time) for time in given[0] if low < time < high), high]
     area = sum(
         ((exact_value(given, a) + exact_value(given, b)) / 2 * (b - a) for a, b in pairwise(cuts)), Fraction(0)
@@ -100,7 +101,8 @@ def exact_integral(given: Given, t: Fraction) -> Fraction:
 
 @given(given_schedules(), st.floats(-5, 5))
 def test_a_schedule_is_linear_between_its_knots_and_holds_outside(given_: Given, t: float) -> None:
-    s, largest = schedule(*given_), max(map(abs, given_[1])) * given_[2]
+    s = schedule(*given_)
+    largest = max(map(abs, given_[1])) * given_[2]
     for time in (t, *given_[0]):
         # value + slope (t - knot): four roundings of terms that are at most twice the largest value.
         expected = float(exact_value(given_, Fraction(time)))

@@ -50,13 +50,18 @@ def test_the_derivative_is_that_of_central_differences(number: int) -> None:
     Where stick begins and ends, the derivative grows with the inverse of how steeply the event is passed. A state
     is left out where a difference changes the sequence of phases, or where halving it tells that it is too large.
     """
-    chance, checked, seen = np.random.default_rng(25), 0, set[int]()
+    chance = np.random.default_rng(25)
+    checked = 0
+    seen = set[int]()
     while checked < number:
         for _, system in shoes(50):
-            (state, span), scales, flow = drawn(system, chance), scales_of(system), SmoothFlow.of(system)
+            state, span = drawn(system, chance)
+            scales = scales_of(system)
+            flow = SmoothFlow.of(system)
             if flow(state, span) != DONE:
                 continue
-            word, exact = flow.word, flow.derivative * scales / scales[:, None]
+            word = flow.word
+            exact = flow.derivative * scales / scales[:, None]
             differences = []
             for size in (1e-5, 5e-6):
                 columns = []
@@ -78,21 +83,27 @@ def test_the_derivative_is_that_of_central_differences(number: int) -> None:
                 continue
             free = [i for i in range(4) if not (word[0] == STICK and i == 2)]  # stick cannot be left along ẋ
             largest = np.abs(exact[:, free]).max()
-            fine, coarse = differences[1][:, free], differences[0][:, free]
+            fine = differences[1][:, free]
+            coarse = differences[0][:, free]
             if np.abs(fine - coarse).max() > 2e-6 * largest:
                 continue
             np.testing.assert_allclose(fine, exact[:, free], rtol=0.0, atol=1e-6 * largest)
-            checked, seen = checked + 1, seen | set(word)
+            checked = checked + 1
+            seen = seen | set(word)
     assert seen == {BACKWARD, STICK, FORWARD, OPEN}
 
 
 def test_within_one_phase_the_derivative_is_the_matrix_exponential() -> None:
     tables, system = shoes(1)[0]
-    shoe, rest, span = Shoe.of(tables), steady_sliding(system), 1e-3
+    shoe = Shoe.of(tables)
+    rest = steady_sliding(system)
+    span = 1e-3
     flow = SmoothFlow.of(system)
     assert flow(np.array([rest.x, rest.y, 0.0, 0.0]), span) == DONE
     a = np.zeros((4, 4))
-    a[:2, 2:], a[2:, :2], a[2:, 2:] = np.eye(2), -shoe.stiffness / shoe.m, -shoe.b / shoe.m
+    a[:2, 2:] = np.eye(2)
+    a[2:, :2] = -shoe.stiffness / shoe.m
+    a[2:, 2:] = -shoe.b / shoe.m
     omega = system.natural_frequencies[1] * 2.0 * np.pi
     scales = np.array([1.0, 1.0, omega, omega])
     exact = expm(a * span) * scales / scales[:, None]
@@ -106,7 +117,8 @@ def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
     chance = np.random.default_rng(26)
     for tables, system in shoes(number):
         state, span = drawn(system, chance)
-        flow, scales = SmoothFlow.of(system), scales_of(system)
+        flow = SmoothFlow.of(system)
+        scales = scales_of(system)
         if flow(state, span, False) != DONE:
             continue
         x, y, vx, vy = state.tolist()
@@ -124,23 +136,32 @@ def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
 def test_a_flow_composes_of_its_parts_and_so_does_its_derivative() -> None:
     chance = np.random.default_rng(27)
     for _, system in shoes(20):
-        (state, span), flow, scales = drawn(system, chance), SmoothFlow.of(system), scales_of(system)
+        state, span = drawn(system, chance)
+        flow = SmoothFlow.of(system)
+        scales = scales_of(system)
         if flow(state, span) != DONE:
             continue
-        end, derivative, spent, part = flow.state, flow.derivative, flow.path.spent.sum(), chance.uniform(0.2, 0.8)
+        end = flow.state
+        derivative = flow.derivative
+        spent = flow.path.spent.sum()
+        part = chance.uniform(0.2, 0.8)
         assert spent == pytest.approx(span, rel=1e-12)
         assert flow(state, part * span) == DONE
-        middle, first = flow.state, flow.derivative
+        middle = flow.state
+        first = flow.derivative
         assert flow(middle, (1.0 - part) * span) == DONE
         np.testing.assert_allclose(flow.state / scales, end / scales, rtol=1e-9, atol=1e-9)
-        product, atol = flow.derivative @ first * scales / scales[:, None], 1e-8 * max(1.0, np.abs(first).max())
+        product = flow.derivative @ first * scales / scales[:, None]
+        atol = 1e-8 * max(1.0, np.abs(first).max())
         np.testing.assert_allclose(product, derivative * scales / scales[:, None], rtol=1e-8, atol=atol)
 
 
 def test_the_velocity_at_both_ends_is_that_of_the_forces() -> None:
     """Eqs. (6) and (7) in steady sliding, from which nothing moves."""
     _, system = shoes(1)[0]
-    rest, flow, scales = steady_sliding(system), SmoothFlow.of(system), scales_of(system)
+    rest = steady_sliding(system)
+    flow = SmoothFlow.of(system)
+    scales = scales_of(system)
     assert flow(np.array([rest.x, rest.y, 0.0, 0.0]), 0.01) == DONE
     omega = 2.0 * np.pi * system.natural_frequencies[1]
     for velocity in (flow.path.start, flow.path.velocity):
@@ -150,20 +171,25 @@ def test_the_velocity_at_both_ends_is_that_of_the_forces() -> None:
 def test_least_margins_tell_how_near_a_motion_comes_to_stick_and_to_flight() -> None:
     """A motion of one mode in slip alone: its margins are least where a dense run of the same flow has them."""
     _, system = shoes(1)[0]
-    rest, flow = steady_sliding(system), SmoothFlow.of(system)
+    rest = steady_sliding(system)
+    flow = SmoothFlow.of(system)
     start = np.array([rest.x + 0.05 * abs(rest.y), rest.y, 0.0, 0.0])
     span = 3.0 / system.natural_frequencies[0]
     assert flow(start, span) == DONE
-    (phase,), least, high = flow.word, flow.path.least.copy(), flow.path.high.copy()
+    (phase,) = flow.word
+    least = flow.path.least.copy()
+    high = flow.path.high.copy()
     states = []
     for part in np.linspace(0.0, 1.0, 4001)[1:]:
         assert flow(start, part * span, False) == DONE
         states.append(flow.state)
-    dense, side = np.array([start, *states]), phase - STICK
+    dense = np.array([start, *states])
+    side = phase - STICK
     slides = float((side * (dense[:, 2] - system.belt_speed)).min())
     assert least[phase, HEIGHT] == pytest.approx(-dense[:, 1].max(), rel=1e-3)
     assert least[phase, SLIDING] == pytest.approx(slides, rel=1e-3)
-    peak, fastest = dense[:, 0].max(), 2.0 * np.pi * system.natural_frequencies[1]
+    peak = dense[:, 0].max()
+    fastest = 2.0 * np.pi * system.natural_frequencies[1]
     missed = 0.125 * (fastest * span / 4000.0) ** 2 * np.ptp(dense[:, 0])  # by samples half a step beside the peak
     assert peak * (1.0 - 1e-12) <= high[0] <= peak + missed
 
@@ -172,7 +198,8 @@ def test_least_margins_tell_how_near_a_motion_comes_to_stick_and_to_flight() -> 
 def test_a_motion_of_too_many_events_is_given_up() -> None:
     """Stick-slip at a hundredth of the natural period and less would not end in 60 events."""
     for _, system in shoes(50):
-        flow, rest = SmoothFlow.of(system), steady_sliding(system)
+        flow = SmoothFlow.of(system)
+        rest = steady_sliding(system)
         start = np.array([rest.x, rest.y, 0.0, 3.0 * abs(rest.y) * 2.0 * np.pi * system.natural_frequencies[1]])
         if flow(start, 1e3 / system.natural_frequencies[0]) == EVENTFUL:
             assert flow.path.events == MOST_EVENTS

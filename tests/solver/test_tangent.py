@@ -31,7 +31,8 @@ FIRST = np.array([0.5, 0.5, 0.5, -0.5])
 def carried(system: System) -> tuple[Motion, Array]:
     """A motion, and the disturbance at its end that has grown from `FIRST`."""
     stepping = Stepping(replace(system, tangents=True))
-    motion, t = stepping.run(), stepping.tangent
+    motion = stepping.run()
+    t = stepping.tangent
     at = t if system.method.own_steps else stepping.plant.beside.state
     size = math.exp(float(np.sum(t.logs)))
     return motion, size * np.array([t.rate * at.x, t.rate * at.y, at.v_x, at.v_y])
@@ -45,7 +46,8 @@ def scales(system: System) -> Array:
 
 def by_neighbours(system: System, size: float) -> Array:
     """The same from two motions beside, on either side."""
-    ends, start = list[Array](), system.initial
+    ends = list[Array]()
+    start = system.initial
     for way in (size, -size):
         x, y, vx, vy = way * FIRST / scales(system)
         beside = replace(start, x=start.x + x, y=start.y + y, vx=start.vx + vx, vy=start.vy + vy)
@@ -68,7 +70,9 @@ def test_in_slip_a_disturbance_grows_as_the_matrix_exponential_says(scheme: str,
     """Steps of the two-layer scheme turn a mode too little, by (ωh)²/12 of its angle: 1e-4 of 9 rad."""
     case = by_scheme(SQUEAL, scheme, initial__at="equilibrium", initial__vx=1e-3, solver__duration=5e-3)
     system = system_of(case)
-    c, k, grip = system.coefficients, system.contact_stiffness, system.coefficients.phi
+    c = system.coefficients
+    k = system.contact_stiffness
+    grip = system.coefficients.phi
     a = np.zeros((4, 4))
     a[0, 2] = a[1, 3] = 1.0
     a[2] = -np.array([c.c_xx, c.c_xy + grip * k, c.b_xx, c.b_xy]) / c.m
@@ -110,7 +114,8 @@ def test_a_limit_cycle_has_the_exponent_zero(scheme: str) -> None:
 def test_events_are_placed_inside_steps_to_second_order(number: int, frequency: float) -> None:
     """The exponent of a limit cycle that sticks, and of one that also lands and turns: a thousandth of a cycle."""
     tables = next(islice(random_shoes("smooth", 5), number, None))
-    step, duration = tables["solver"]["step"] / 4.0, 4.0 * tables["solver"]["duration"]
+    step = tables["solver"]["step"] / 4.0
+    duration = 4.0 * tables["solver"]["duration"]
     case = by_scheme(tables, "two-layer", solver__step=step, solver__duration=duration)
     motion = solve(replace(system_of(case), tangents=True))
     assert motion.exponent is not None
@@ -122,7 +127,8 @@ def test_a_forced_motion_has_the_exponent_of_its_multiplier() -> None:
     tables, key, low, high, _ = opening(6, "opening")
     line = Line(make(tables), [key.replace("__", ".")], low, high)
     p = line.place(1.0)
-    point, period = Forced.along(line).begun(p), common_period(line.system(p))
+    point = Forced.along(line).begun(p)
+    period = common_period(line.system(p))
     assert point is not None
     assert period is not None
     expected = math.log(float(np.abs(point.multipliers).max())) / period
@@ -152,7 +158,8 @@ def test_it_grows_as_published_of_the_minimal_model_of_mode_coupling(scheme: str
 def test_the_disturbance_changes_nothing_of_the_motion() -> None:
     for scheme in ("two-layer", "three-layer", "piecewise-exact", "event-driven"):
         system = system_of(by_scheme(SQUEAL, scheme))
-        alone, beside = solve(system), solve(replace(system, tangents=True))
+        alone = solve(system)
+        beside = solve(replace(system, tangents=True))
         np.testing.assert_array_equal(alone.rows, beside.rows)
         assert alone.exponent is None
         assert beside.exponent is not None

@@ -109,7 +109,8 @@ def test_a_shoe_that_turns_through_the_velocity_of_the_wheel_does_not_stick_unti
 def test_a_bouncing_shoe_lifts_and_touches_when_the_closed_form_says_so(scheme: str) -> None:
     """ÿ + 11 y = -11 in contact and ÿ + y = -11 in flight, from the lowest point y = -3 on, without losses."""
     fast = math.sqrt(11.0)
-    first, speed = 2.0 * math.pi / 3.0 / fast, fast * math.sqrt(3.0)
+    first = 2.0 * math.pi / 3.0 / fast
+    speed = fast * math.sqrt(3.0)
     flight = 2.0 * math.atan(speed / 11.0)
     lifts = first + (2.0 * first + flight) * np.arange(8)
     errors = []
@@ -178,10 +179,12 @@ def test_a_rough_shoe_leaves_the_wheel_in_event_driven_steps_where_short_steps_s
 
 def open_parts(track: Track, parts: int) -> float:
     """The largest closing error of a part, over the largest item of its account."""
-    errors, begin = list[float](), track.times[:-1]
+    errors = list[float]()
+    begin = track.times[:-1]
     for first in range(0, len(begin) - len(begin) // parts, len(begin) // parts):
         last = first + len(begin) // parts
-        powers, span = track.powers(track.times[first], track.times[last]), track.times[last] - track.times[first]
+        powers = track.powers(track.times[first], track.times[last])
+        span = track.times[last] - track.times[first]
         items = [
             *powers[:-1],
             *(track.works[last] - track.works[first])[:2] / span,
@@ -223,13 +226,15 @@ def test_works_are_those_of_the_run_and_friction_gives_what_samples_say(scheme: 
     """The mean of F_x ẋ over samples, by the trapezoidal rule."""
     case = by_scheme(SQUEAL, scheme, 1e-5, solver__duration=0.1, output__sample_interval=1e-5)
     motion = tracked(case)
-    track, end = motion.track, motion.system.sampled_duration
+    track = motion.track
+    end = motion.system.sampled_duration
     assert track is not None
     assert len(track.times) <= PARTS + 1
     assert track.times[0] <= 1e-5 < end <= track.times[-1] < end + 1e-5
     total = [getattr(motion.energy, name) for name in list(WORK.fields or ())[:6]]
     np.testing.assert_allclose(track.works[-1], total, rtol=1e-12)
-    powers, given = track.powers(0.0, end), motion.rows[:, 4] * motion.rows[:, 2]
+    powers = track.powers(0.0, end)
+    given = motion.rows[:, 4] * motion.rows[:, 2]
     assert powers.friction == pytest.approx(float((given[1:] + given[:-1]).mean()) / 2.0, rel=2e-3)
     assert track.powers(end, end).stored != 0.0  # over the last part
 
@@ -242,7 +247,8 @@ def test_histories_are_the_same_bits_with_it_and_without(scheme: str, name: str)
     tables: Tables = {"smooth": SQUEAL, "exact": ROUGH, "nodes": ROUGH, "window": BOUNCING}[name]
     exact = {"contact__evaluator": "exact", "contact__nodes": None} if name == "exact" else {}
     system = system_of(by_scheme(tables, scheme, 1e-5, solver__duration=0.02, **exact))
-    plain, noted = solve(system), solve(replace(system, tracked=True))
+    plain = solve(system)
+    noted = solve(replace(system, tracked=True))
     assert plain.track is None
     assert noted.track is not None
     assert (plain.rows == noted.rows).all()
@@ -269,7 +275,9 @@ def test_a_ring_that_overflows_says_since_when_it_is_complete() -> None:
 def test_samples_tell_of_the_same_events_as_the_loop() -> None:
     tables: Tables = next(islice(random_shoes("smooth", 5), 7, None))
     motion = tracked(by_scheme(tables, "piecewise-exact", 0.0))
-    track, interval, rows = motion.track, motion.system.interval, motion.rows
+    track = motion.track
+    interval = motion.system.interval
+    rows = motion.rows
     assert track is not None
     times: Array = interval * np.arange(len(rows))
     found = events_from_samples(times, rows[:, 0], rows[:, 2], rows[:, 7])

@@ -129,7 +129,10 @@ class Inline(Engine):
     workers = 1
 
     def __init__(self, plan: Plan, compute: Compute, limit: int | None = None, order: int = 1) -> None:
-        self._plan, self._compute, self._limit, self._order = plan, compute, limit, order
+        self._plan = plan
+        self._compute = compute
+        self._limit = limit
+        self._order = order
 
     def __exit__(self, *error: object) -> None:
         pass
@@ -229,7 +232,8 @@ def large(file: str) -> None:
 
 def memory(file: str, name: str) -> None:
     """Sweep by a function, and print the largest memory of this process and of its workers, in bytes."""
-    largest, looked = 0, 0.0
+    largest = 0
+    looked = 0.0
 
     def progress(*_: int) -> None:
         nonlocal largest, looked

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 mpmath: Any = import_module("mpmath")  # imported so because it has no type hints
 Floats = NDArray[np.float64]
 Tables = dict[str, Any]
-CELLS, STEPS = 200, 60  # of the pad; of a period of the fastest motion or passing wave
+# of the pad; of a period of the fastest motion or passing wave
+CELLS = 200
+STEPS = 60
 NEUTRAL = 1e-5  # damping ratio of the slowest motion that would stop what counts as no growth without dashpots
 
 
@@ -25,33 +27,49 @@ def _rates(z: Any, moved: float, links: Any, waves: Any, sines: Any, cosines: An
     """Velocities and accelerations, and those of four disturbances in the columns after; returns the slip."""
     m, cxx, cxy, cyy, bxx, bxy, byy, qx, qy, grip, belt, k, cell = links
     count = waves.shape[1]
-    up, along = np.empty(count), np.empty(count)
+    up = np.empty(count)
+    along = np.empty(count)
     for i in range(count):
         angle = waves[1, i] * (z[0, 0] - moved) + waves[2, i]
-        up[i], along[i] = waves[0, i] * math.sin(angle), waves[0, i] * math.cos(angle)
+        up[i] = waves[0, i] * math.sin(angle)
+        along[i] = waves[0, i] * math.cos(angle)
     force = slope = touching = before = steep_before = 0.0
     for j in range(shoe.size):
-        gap, steep = -shoe[j] - z[1, 0], 0.0
+        gap = -shoe[j] - z[1, 0]
+        steep = 0.0
         for i in range(count):
             gap += up[i] * cosines[i, j] + along[i] * sines[i, j]
             steep += waves[1, i] * (along[i] * cosines[i, j] - up[i] * sines[i, j])
         if j and (gap > 0.0 or before > 0.0):
             if gap > 0.0 and before > 0.0:
-                force, slope, touching = force + gap + before, slope + steep + steep_before, touching + 2.0
+                force = force + gap + before
+                slope = slope + steep + steep_before
+                touching = touching + 2.0
             else:
-                high, low, by_high, by_low = gap, before, steep, steep_before
+                high = gap
+                low = before
+                by_high = steep
+                by_low = steep_before
                 if high < low:
                     high, low, by_high, by_low = low, high, by_low, by_high
                 part = high / (high - low)
-                force, touching = force + part * high, touching + 2.0 * part
+                force = force + part * high
+                touching = touching + 2.0 * part
                 slope += (2.0 * part - part * part) * by_high + part * part * by_low
-        before, steep_before = gap, steep
-    force, slope, touching = 0.5 * k * cell * force, 0.5 * k * cell * slope, 0.5 * k * cell * touching
+        before = gap
+        steep_before = steep
+    force = 0.5 * k * cell * force
+    slope = 0.5 * k * cell * slope
+    touching = 0.5 * k * cell * touching
     for c in range(5):
-        x, y, vx, vy = z[0, c], z[1, c], z[2, c], z[3, c]
+        x = z[0, c]
+        y = z[1, c]
+        vx = z[2, c]
+        vy = z[3, c]
         pull = slope * x - touching * y if c else force
         load = 0.0 if c else 1.0
-        out[0, c], out[1, c] = vx, vy
+        out[0, c] = vx
+        out[1, c] = vy
         out[2, c] = (grip * pull - bxx * vx - bxy * vy - cxx * x - cxy * y - load * qx) / m
         out[3, c] = (pull - bxy * vx - byy * vy - cxy * x - cyy * y - load * qy) / m
     return float((belt - z[2, 0]) * math.copysign(1.0, belt))
@@ -62,10 +80,14 @@ def _passed(
     state: Any, links: Any, waves: Any, sines: Any, cosines: Any, shoe: Any, step: float, steps: int
 ) -> tuple[Any, float]:
     """State and tangent (columns) after so many steps, and the least slip."""
-    z, slip = np.zeros((4, 5)), np.inf
+    z = np.zeros((4, 5))
+    slip = np.inf
     z[:, 0] = state
     z[:, 1:] = np.eye(4)
-    a, b, c, d = np.empty((4, 5)), np.empty((4, 5)), np.empty((4, 5)), np.empty((4, 5))
+    a = np.empty((4, 5))
+    b = np.empty((4, 5))
+    c = np.empty((4, 5))
+    d = np.empty((4, 5))
     for n in range(steps):
         at = links[10] * n * step
         half = 0.5 * links[10] * step
@@ -79,11 +101,15 @@ def _passed(
 
 def held_by(tables: Tables, number: Any = float, trig: Any = math) -> tuple[Any, ...]:
     """Mass, stiffnesses and damping (xx, xy, yy), stiffness of the contact, load, and grip of a shoe."""
-    one, other = tables["link1"], tables["link2"]
+    one = tables["link1"]
+    other = tables["link2"]
     beta, alpha = (number(link["angle_deg"]) * number(trig.pi) / 180 for link in (one, other))
 
     def triple(along: Any, across: Any) -> tuple[Any, Any, Any]:
-        s, c, sa, ca = trig.sin(beta), trig.cos(beta), trig.sin(alpha), trig.cos(alpha)
+        s = trig.sin(beta)
+        c = trig.cos(beta)
+        sa = trig.sin(alpha)
+        ca = trig.cos(alpha)
         return along * s**2 + across * ca**2, along * s * c - across * sa * ca, along * c**2 + across * sa**2
 
     stiff = triple(number(one["stiffness"]), number(other["stiffness"]))
@@ -105,9 +131,13 @@ def smooth_is_unstable(tables: Tables) -> bool:
     """Whether steady sliding on smooth surfaces is unstable, or has ended."""
     with mpmath.workdps(50):
         m, (cxx, cxy, cyy), (bxx, bxy, byy), contact, _, grip = held_by(tables, mpmath.mpf, mpmath)
-        above, below = cxy + grip * contact, cyy + contact
-        a4, a3, a2 = m * m, m * (bxx + byy), m * (cxx + below) + bxx * byy - bxy**2
-        a1, a0 = bxx * below + byy * cxx - bxy * (cxy + above), cxx * below - cxy * above
+        above = cxy + grip * contact
+        below = cyy + contact
+        a4 = m * m
+        a3 = m * (bxx + byy)
+        a2 = m * (cxx + below) + bxx * byy - bxy**2
+        a1 = bxx * below + byy * cxx - bxy * (cxy + above)
+        a0 = cxx * below - cxy * above
         if a3 == 0:
             return bool(a0 <= 0 or a2 * a2 <= 4 * a4 * a0)
         return bool(a0 <= 0 or a1 <= 0 or a1 * a2 * a3 - a1**2 * a4 - a0 * a3**2 <= 0)
@@ -119,7 +149,8 @@ class Wheel:
     def __init__(self, tables: Tables, part: float = 1.0) -> None:
         """`part`: of the amplitudes of the wheel."""
         m, stiff, damped, contact, load, grip = held_by(tables)
-        rough, half = tables["roughness"], tables["contact"]["half_length"]
+        rough = tables["roughness"]
+        half = tables["contact"]["half_length"]
         cell = 2.0 * half / CELLS
         self.belt = tables["wheel"]["radius"] * tables["wheel"]["angular_speed"]
         self.links = np.array([m, *stiff, *damped, *load, grip, self.belt, tables["contact"]["stiffness"], cell])
@@ -168,7 +199,8 @@ class Wheel:
             for part in (1.0, 0.5, 0.2, 0.05):
                 moved, slip = self.passed(state + part * change)
                 if np.abs((moved[:, 0] - state - part * change) / self.scales).max() < gap:
-                    state, z = state + part * change, moved
+                    state = state + part * change
+                    z = moved
                     break
             else:
                 return (state, z[:, 1:], slip) if gap < 1e-6 else None
@@ -182,14 +214,17 @@ def forced(tables: Tables, near: Floats | None = None) -> tuple[float, Floats]:
     """
     wheel = Wheel(tables)
     found = wheel.closed(near) if near is not None else None
-    part, stride, state = 0.0, 0.5, wheel.rest
+    part = 0.0
+    stride = 0.5
+    state = wheel.rest
     while found is None and stride > 0.01:
         more = min(part + stride, 1.0)
         grown = Wheel(tables, more).closed(state)
         if grown is None:
             stride *= 0.5
         else:
-            part, state = more, grown[0]
+            part = more
+            state = grown[0]
             found = grown if more == 1.0 else None
     if found is None:  # a stable one is reached by waiting
         state = wheel.rest

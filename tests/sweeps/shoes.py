@@ -33,12 +33,17 @@ def drawn(seed: int, kind: str) -> tuple[Tables, str, float, float, float]:
         return float(f"{rng.uniform(low, high):.3g}")
 
     while True:
-        m, c1, half = spread(2.0, 60.0), spread(4e5, 1e7), float(rng.choice([0.02, 0.03, 0.05]))
-        contact, side = c1 * spread(0.15, 1.5), float(rng.choice([1.0, 1.0, -1.0]))
-        alpha, beta = between(3.0, 30.0), float(rng.choice([0.0, between(-15.0, 15.0)]))
+        m = spread(2.0, 60.0)
+        c1 = spread(4e5, 1e7)
+        half = float(rng.choice([0.02, 0.03, 0.05]))
+        contact = c1 * spread(0.15, 1.5)
+        side = float(rng.choice([1.0, 1.0, -1.0]))
+        alpha = between(3.0, 30.0)
+        beta = float(rng.choice([0.0, between(-15.0, 15.0)]))
         c2 = (c1 + contact) * between(0.6, 1.5)
         if kind == "soft":
-            alpha, beta = -between(1.0, 50.0), float(rng.choice([0.0, between(0.0, 0.05)]))
+            alpha = -between(1.0, 50.0)
+            beta = float(rng.choice([0.0, between(0.0, 0.05)]))
             c2 = c1 * spread(1e-6, 1e-2)
         ratio = 0.0 if kind == "undamped" or (kind == "soft" and rng.random() < 0.4) else spread(0.001, 0.02)
         b1 = 2.0 * ratio * math.sqrt(c1 * m)
@@ -96,7 +101,8 @@ def drawn(seed: int, kind: str) -> tuple[Tables, str, float, float, float]:
         )
     tables["friction"]["coefficient"] = critical * between(0.8, 1.2)
     table, name = key.split("__")
-    here, (low, high) = tables[table][name], {"link2__stiffness": (0.6, 1.6)}.get(key, (0.8, 1.25))
+    here = tables[table][name]
+    low, high = {"link2__stiffness": (0.6, 1.6)}.get(key, (0.8, 1.25))
     low, high = sorted((low * here, high * here))
     return tables, key, low, high, 1e-3 * (high - low)
 

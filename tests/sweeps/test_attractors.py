@@ -102,14 +102,16 @@ def test_a_gap_that_another_motion_hides_is_found(tmp_path: Path) -> None:
 
 def test_the_order_of_the_points_does_not_matter(tmp_path: Path) -> None:
     rng = np.random.default_rng(5)
-    sizes, tones = rng.choice([1e-6, 1.2e-6, 4e-6], 60), rng.choice([50.0, 100.0], 60)
+    sizes = rng.choice([1e-6, 1.2e-6, 4e-6], 60)
+    tones = rng.choice([50.0, 100.0], 60)
     spread = rng.uniform(0.99, 1.01, (2, 60))
     points = [
         {**CYCLE, "amplitude": size, "frequency": tone}
         for size, tone in zip(sizes * spread[0], tones * (1.0 + 0.1 * (spread[1] - 1.0)), strict=True)
     ]
     order = rng.permutation(60)
-    one, other = swept(tmp_path, points), swept(tmp_path, [points[place] for place in order])
+    one = swept(tmp_path, points)
+    other = swept(tmp_path, [points[place] for place in order])
     assert one.findings.attractors == other.findings.attractors
     assert [numbers_of(one)[place] for place in order] == numbers_of(other)
     kinds = [*zip(sizes.tolist(), tones.tolist(), strict=True)]
@@ -131,7 +133,9 @@ def test_points_that_are_not_decided_have_no_attractor_and_widen_the_shares(tmp_
 
     def ends(hits: int) -> tuple[float, float]:
         """Wilson's: where the share differs from p by 1.96 standard deviations of p itself, a quadratic in p."""
-        part, z2, n = hits / 11, 1.959963984540054**2, 11
+        part = hits / 11
+        z2 = 1.959963984540054**2
+        n = 11
         roots = np.roots([1.0 + z2 / n, -2.0 * part - z2 / n, part * part]).tolist()
         return min(roots), max(roots)
 

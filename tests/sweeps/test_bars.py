@@ -125,12 +125,11 @@ BETWEEN: Tables = {  # stable for half a per cent of the range
 @pytest.mark.parametrize(("tables", "upper", "windows"), [(DAMPING, 4.0, 1), (BETWEEN, 5.8, 2)])
 @campaign
 def test_the_truth_lies_within_the_error_bars_of_all_windows(tables: Tables, upper: float, windows: int) -> None:
-    key, critical = (
-        "friction__coefficient",
-        Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=1e-4),
-    )
+    key = "friction__coefficient"
+    critical = Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=1e-4)
     found = search(critical, Line(make(tables), [critical.parameter], critical.lower, critical.upper))
-    ends, errors = np.ravel(found.windows), np.ravel(found.window_errors)
+    ends = np.ravel(found.windows)
+    errors = np.ravel(found.window_errors)
     assert (found.value, found.error) == (ends[0], errors[0])
     assert len(found.windows) == windows
     assert (ends[-1], errors[-1]) == (upper, 0.0)
@@ -170,7 +169,8 @@ def test_a_narrow_window_lies_where_the_scheme_vibrates_at_half_the_frequency_of
         "roughness": {"wheel": {"amplitudes": [2.59e-5, 3.51e-5], "wavelengths": [0.035, 0.064]}},
         "solver": {"duration": 0.3, "step": 0.00026},
     }
-    key, critical = "friction__coefficient", Critical(parameter="friction.coefficient", lower=1.4, upper=2.2)
+    key = "friction__coefficient"
+    critical = Critical(parameter="friction.coefficient", lower=1.4, upper=2.2)
     found = search(critical, Line(make(tables), [critical.parameter], critical.lower, critical.upper))
     assert found.value is not None
     assert found.error is not None

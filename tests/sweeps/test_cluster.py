@@ -47,7 +47,8 @@ class Cluster:
     """A scheduler in a process of its own, and workers in others, on the loopback address."""
 
     def __init__(self, folder: Path, stack: ExitStack, allowed_failures: int) -> None:
-        self.folder, self._stack = folder, stack
+        self.folder = folder
+        self._stack = stack
         self.file = folder / "scheduler.json"
         options = ["--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(self.file)]
         failures = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": str(allowed_failures)}

@@ -278,7 +278,8 @@ def event_driven_growth(friction: float) -> float:
     system = system_of(
         make({**OPENS, "solver": solver, "output": {"sample_interval": 1e-4}}, friction__coefficient=friction)
     )
-    period, depth = common_period(system), 1e-6
+    period = common_period(system)
+    depth = 1e-6
     assert period is not None
     scales = depth * np.array([1.0, 1.0, *[2.0 * math.pi * system.natural_frequencies[1]] * 2])
     system = replace(system, interval=period, duration=period)
@@ -304,7 +305,8 @@ def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undec
     tables = {**OPENS, "roughness": {**OPENS["roughness"], "wheel": wheel}}
     system = system_of(make(tables, friction__coefficient=friction))
     assert common_period(system) is None
-    measured, rate = exponent(system, steady_sliding(system)), event_driven_growth(friction)
+    measured = exponent(system, steady_sliding(system))
+    rate = event_driven_growth(friction)
     assert measured is not None
     assert measured.unstable in (rate > 0.0, None)
     if measured.unstable is not None or rate < 0.0:
@@ -382,7 +384,8 @@ def test_a_window_between_two_values_of_the_scan_has_a_narrow_bar() -> None:
     """Two-layer steps are as exact as the eigenvalues here: -83.3456, 0.3913, 6.2881 by their polynomial."""
     changes = {"friction__coefficient": 0.7, "solver__scheme": "two-layer", "solver__step": 2e-5}
     answer = found(SQUEAL, -90.0, 90.0, "link2__angle_deg", tolerance=0.1, **changes)
-    upper, error = answer.windows[1], answer.window_errors[1]
+    upper = answer.windows[1]
+    error = answer.window_errors[1]
     assert answer.outcome is Outcome.FOUND
     np.testing.assert_allclose([answer.windows[0][1], *upper], [-83.3456, 0.3913, 6.2881], atol=0.05)
     assert max(error) < 0.1

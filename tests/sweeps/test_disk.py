@@ -76,7 +76,8 @@ def repair() -> None:
 
 def failing_write(folder: Path) -> list[str]:
     """Let each write of a sweep fail, every other one in part; then sweep again."""
-    loaded, output = write_sweep(folder, frictions(6)), folder / "s.h5"
+    loaded = write_sweep(folder, frictions(6))
+    output = folder / "s.h5"
     output.write_text("old")
     count = fail_at(10**9, partly=False)
     inline(loaded, output, task_size=2, force=True)
@@ -86,7 +87,8 @@ def failing_write(folder: Path) -> list[str]:
     inline(loaded, folder / "expected.h5", task_size=2)
     expected = (folder / "expected.h5").read_bytes()
     names = left_in(folder)
-    outcomes, told = [], set()
+    outcomes = []
+    told = set()
     for number in range(1, writes + 2):
         output.write_text("old")
         count = fail_at(number, partly=number % 2 == 0)

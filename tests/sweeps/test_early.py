@@ -50,11 +50,14 @@ def known(case: Case) -> tuple[System, Judged[Ending]]:
 
 def compare(found: Judged[Ending], case: Case) -> None:
     """A whole run says the same, its numbers within what its samples show of them."""
-    ours, whole, system = found.verdict, simulate(case).verdict, found.motion.system
+    ours = found.verdict
+    whole = simulate(case).verdict
+    system = found.motion.system
     assert (ours.regime, ours.excitation, ours.settled) == (whole.regime, whole.excitation, whole.settled)
     of_points = [field.name for field in POINT if getattr(whole, field.name, None) is not None]
     assert [name for name in of_points if getattr(ours, name) is None] == []  # what a sweep would not give
-    fast, interval = system.natural_frequencies[1], system.interval
+    fast = system.natural_frequencies[1]
+    interval = system.interval
     seen = 0.5 * (math.pi * fast * interval) ** 2  # of an amplitude between two samples, at the fastest frequency
     depth = system.load_at_start / (system.coefficients.c_yy + system.contact_stiffness)
     if whole.frequency is None:
@@ -99,7 +102,8 @@ def test_an_early_verdict_is_that_of_the_whole_run(shoes: int) -> None:
 
 @pytest.mark.parametrize("points", counts(15, 1000))
 def test_a_map_of_regimes_is_known_early_but_for_one_point_in_fifty(points: int) -> None:
-    rng, found = np.random.default_rng(7), 0
+    rng = np.random.default_rng(7)
+    found = 0
     for friction, speed in rng.uniform((0.5, 0.04), (0.8, 0.8), (points, 2)).tolist():
         case = case_of(RELAXATION, EXACT, f"friction.coefficient={friction}", f"wheel.angular_speed={speed}")
         known_early = early(system_of(case))
@@ -130,7 +134,8 @@ def test_the_first_tenth_of_a_motion_with_many_events_is_followed_to_its_end() -
     solver = "solver={tolerance=1e-3,duration=20.0}"
     case = case_of(starters()["branch"], solver, "friction.coefficient=0.167", start)
     system, found = known(case)
-    flow, theory = SmoothFlow.of(system), linear_theory(system, system.belt_speed)
+    flow = SmoothFlow.of(system)
+    theory = linear_theory(system, system.belt_speed)
     assert theory is not None
     assert flow(system.initial.beside(theory.rest), 2.0, tangents=False) == EVENTFUL
     assert found.verdict.regime == "damped"
@@ -159,11 +164,13 @@ def one_cycle(system: System, found: Judged[Ending], samples: int, cycles: int =
 @pytest.mark.parametrize("name", ORBITS)
 def test_an_orbit_closes_and_its_numbers_are_those_of_one_cycle(name: str) -> None:
     system, found = known(case_of(RELAXATION, EXACT, *ORBITS[name]))
-    verdict, samples = found.verdict, 2000
+    verdict = found.verdict
+    samples = 2000
     assert (verdict.stick_fraction > 0.0) is (name != "lift-off")
     assert (verdict.contact_loss_fraction > 0.0) is ("lift-off" in name)
     motion = one_cycle(system, found, samples)
-    rows, period = motion.rows, 1.0 / (verdict.frequency or 0.0)
+    rows = motion.rows
+    period = 1.0 / (verdict.frequency or 0.0)
     size = 0.5 * np.ptp(rows[:, :4], axis=0)
     np.testing.assert_array_less(np.abs(rows[-1, :4] - rows[0, :4]), 1e-8 * size)
     # a parabola between samples
@@ -182,7 +189,8 @@ def test_an_orbit_closes_and_its_numbers_are_those_of_one_cycle(name: str) -> No
 def test_the_largest_multiplier_is_how_neighbours_return(name: str) -> None:
     """A disturbance that has come round some cycles is along the multiplier's direction, and shrinks by it."""
     system, found = known(case_of(RELAXATION, EXACT, *ORBITS[name]))
-    factor, cycles = found.verdict.evidence["largest_multiplier"], 60
+    factor = found.verdict.evidence["largest_multiplier"]
+    cycles = 60
     rows = one_cycle(system, found, 1, cycles, moved=1e-4).rows[:, :4]
     steps = np.linalg.norm(np.diff(rows, axis=0) / np.array([1.0, 1.0, *[2.0 * math.pi * 174.0] * 2]), axis=1)
     slope = np.polyfit(np.arange(cycles - 10), np.log(steps[10:]), 1)[0]  # the phase is off by more and more of it
@@ -208,7 +216,8 @@ def test_there_is_no_early_verdict_where_a_whole_run_may_see_something_else(chan
 
 @campaign
 def test_a_point_takes_less_than_200_bytes_of_journal_and_of_result(tmp_path: Path) -> None:
-    case, sizes = TINY.replace("step = 1e-5, duration = 0.02", "tolerance = 1e-3, duration = 1.0"), []
+    case = TINY.replace("step = 1e-5, duration = 0.02", "tolerance = 1e-3, duration = 1.0")
+    sizes = []
     speeds = axis("wheel.angular_speed", "start=0.1", "stop=2.0", "num=20")
     for frictions_tried in (2, 20):
         loaded = write_sweep(tmp_path, frictions(frictions_tried), speeds, case=case)
@@ -258,6 +267,7 @@ def test_a_short_rise_of_the_velocity_that_steps_do_not_show_is_no_end_of_a_cycl
     frequency = found.verdict.frequency
     assert frequency is not None
     assert frequency == pytest.approx(134.94026, abs=1e-5)
-    flow, (x, y, v_x, v_y) = SmoothFlow.of(system), found.motion.rows[0]
+    flow = SmoothFlow.of(system)
+    x, y, v_x, v_y = found.motion.rows[0]
     assert flow(np.array([x, y, v_x, v_y]), 1.0 / frequency) == DONE
     np.testing.assert_allclose(flow.state, [x, y, v_x, v_y], atol=1e-9 * found.verdict.amplitude * 850.0)

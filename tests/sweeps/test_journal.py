@@ -212,7 +212,8 @@ def test_a_block_that_holds_something_else_is_computed_again(
     tmp_path: Path, forge: Callable[[bytes, np.dtype[Any]], bytes], by: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its checksum is right: somebody has made it."""
-    loaded, tried = write_sweep(tmp_path, frictions(4)), set[int]()
+    loaded = write_sweep(tmp_path, frictions(4))
+    tried = set[int]()
     inline(loaded, tmp_path / "expected.h5")
 
     def wrong_once(plan: Plan, first: int, count: int) -> bytes:
@@ -237,7 +238,8 @@ def test_a_block_that_holds_something_else_is_computed_again(
 def test_a_block_that_cannot_be_unpacked_is_computed_again(
     tmp_path: Path, kept: int | None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    loaded, pack = write_sweep(tmp_path, frictions(4)), zlib.compress
+    loaded = write_sweep(tmp_path, frictions(4))
+    pack = zlib.compress
     with open_journal(tmp_path / "s.h5.partial", loaded.plan, force=False) as journal:
         monkeypatch.setattr(zlib, "compress", lambda data, level: pack(data, level)[:kept] if kept else data)
         journal.add(0, compute_units(loaded.plan, 0, 2))
@@ -274,7 +276,8 @@ def test_a_profile_that_changes_or_goes_while_a_sweep_runs_changes_no_point(
     for name in ("p.csv", "q.csv"):
         Path(name).write_text(PROFILE)
     surface = "\n[roughness]\nwheel.profile = 'p.csv'\n"
-    profiles, radii = axis("roughness.wheel.profile", "values = ['p.csv', 'q.csv']"), "values = [0.5, 0.6]"
+    profiles = axis("roughness.wheel.profile", "values = ['p.csv', 'q.csv']")
+    radii = "values = [0.5, 0.6]"
     loaded = write_sweep(Path(), profiles, axis("wheel.radius", radii), case=TINY + surface)
     inline(loaded, tmp_path / "whole.h5", compute_units)
 
@@ -308,7 +311,8 @@ def test_all_names_of_a_profile_have_one_reading(tmp_path: Path, monkeypatch: py
 
 
 def test_a_sweep_goes_on_in_a_folder_that_was_moved_and_behind_a_new_link(tmp_path: Path) -> None:
-    before, after = tmp_path / "before", tmp_path / "after"
+    before = tmp_path / "before"
+    after = tmp_path / "after"
     before.mkdir()
     (before / "p.csv").write_text(PROFILE)
     surface = "\n[roughness]\nwheel.profile = 'p.csv'\n"
@@ -344,7 +348,8 @@ def test_a_change_of_any_source_is_a_change_of_the_sweep(tmp_path: Path) -> None
 @pytest.mark.parametrize("force", [False, True])
 @pytest.mark.parametrize("kind", ["text", "binary", "pipe", "link"])
 def test_what_is_no_journal_is_named_and_left_alone(tmp_path: Path, kind: str, force: bool) -> None:
-    loaded, place = write_sweep(tmp_path, frictions(2)), tmp_path / "s.h5.partial"
+    loaded = write_sweep(tmp_path, frictions(2))
+    place = tmp_path / "s.h5.partial"
     (tmp_path / "precious").write_bytes(b"kept\n")
     make: dict[str, Callable[[], object]] = {
         "text": lambda: place.write_bytes(b"kept\n"),

@@ -171,7 +171,8 @@ def test_wrong_points_from_python(tmp_path: Path, points: Any, said: str) -> Non
 
 def noted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[str]:
     """The texts that a function of the module is called with from now on."""
-    texts, before = list[str](), getattr(listed_points, name)
+    texts = list[str]()
+    before = getattr(listed_points, name)
 
     def called(text: str) -> Any:
         texts.append(text)
@@ -185,7 +186,8 @@ def test_a_table_of_too_many_keys_or_points_is_refused_while_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """No more lines are read than it takes to know that, and no more keys are parsed than a line holds."""
-    parsed, values = noted(monkeypatch, "key_path"), noted(monkeypatch, "_value")
+    parsed = noted(monkeypatch, "key_path")
+    values = noted(monkeypatch, "_value")
     monkeypatch.setattr(listed_points, "MOST_VALUES", 1000)
     keys = [f"a.b{number}" for number in range(3000)]
     for plan, said in (

@@ -52,11 +52,13 @@ class Followed:
     def __post_init__(self) -> None:
         self.tables = numbered(SEED, self.number)
         system = system_of(make(self.tables))
-        report, self.speed = stability(system), system.belt_speed
+        report = stability(system)
+        self.speed = system.belt_speed
         found = thresholds(make(self.tables), system, report)
         assert report.critical is not None
         assert found.coexists_from is not None
-        self.critical, self.lower = report.critical.friction, found.coexists_from
+        self.critical = report.critical.friction
+        self.lower = found.coexists_from
         self.frequency = report.critical.frequency
 
     def loop(self, values: list[float], duration: float, direction: str = "both", key: str = FRICTION) -> Loop:
@@ -87,7 +89,8 @@ def test_the_loop_opens_at_the_critical_value_and_closes_at_the_fold(tmp_path: P
     """On the way up the step of the axis is the disturbance. It is below the barrier, but for the last one."""
     shoe = Followed(tmp_path, number)
     values = np.linspace(0.9 * shoe.lower, 1.08 * shoe.critical, 15).tolist()
-    found, step = shoe.loop(values, 3000.0 / shoe.frequency), values[1] - values[0]
+    found = shoe.loop(values, 3000.0 / shoe.frequency)
+    step = values[1] - values[0]
     assert min(found.vibrates["up"]) - step <= shoe.critical <= min(found.vibrates["up"])
     assert min(found.vibrates["down"]) - step <= shoe.lower <= min(found.vibrates["down"])
 

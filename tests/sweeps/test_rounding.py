@@ -42,8 +42,11 @@ def drawn(rng: np.random.Generator) -> tuple[Tables, str, float, float]:
     def spread(low: float, high: float) -> float:
         return float(10.0 ** rng.uniform(math.log10(low), math.log10(high)))
 
-    m, c1, half = spread(1.0, 100.0), spread(1e5, 1e8), spread(0.005, 0.1)
-    c2, contact = c1 * spread(1e-4, 1e2), c1 * spread(1e-2, 1e3)
+    m = spread(1.0, 100.0)
+    c1 = spread(1e5, 1e8)
+    half = spread(0.005, 0.1)
+    c2 = c1 * spread(1e-4, 1e2)
+    contact = c1 * spread(1e-2, 1e3)
     low, high = [(1e-4, 0.3), (1e-9, 1e-5), (0.0, 0.0)][rng.choice(3, p=[0.5, 0.25, 0.25])]
     b1, b2 = (2.0 * spread(low, high) * math.sqrt(c * m) if high else 0.0 for c in (c1, c2))
     tables: Tables = {
@@ -84,7 +87,8 @@ def held_and_bars(
     found: Search, tables: Tables, key: str, lower: float, upper: float
 ) -> tuple[list[bool], list[float]]:
     """Whether stability changes within the bar of each end of a window that no bound cuts, and the bars."""
-    held, bars = [], []
+    held = []
+    bars = []
     with mpmath.workdps(50):
         for value, bar in zip(
             np.ravel(found.windows).tolist(), np.ravel(found.window_errors).tolist(), strict=True
@@ -100,7 +104,10 @@ def held_and_bars(
 
 @pytest.mark.parametrize("shoes", counts(0, 200, 1000))
 def test_every_bar_of_an_end_of_a_window_holds_the_truth_and_is_narrow(shoes: int) -> None:
-    rng, tried, ends, narrow = np.random.default_rng(29), 0, 0, list[bool]()
+    rng = np.random.default_rng(29)
+    tried = 0
+    ends = 0
+    narrow = list[bool]()
     while tried < shoes:
         shoe = drawn(rng)
         tolerance = 1e-6 * (shoe[3] - shoe[2])
@@ -109,7 +116,8 @@ def test_every_bar_of_an_end_of_a_window_holds_the_truth_and_is_narrow(shoes: in
             continue
         held, bars = held_and_bars(found, *shoe)
         assert all(held), shoe
-        tried, ends = tried + 1, ends + len(bars)
+        tried = tried + 1
+        ends = ends + len(bars)
         narrow += [bar < 1e-9 * tolerance + 1e-12 * (shoe[3] - shoe[2]) for bar in bars]
     assert ends >= tried
     # One shoe in ten is badly conditioned: hardly any dashpots, links so soft beside the pad that they cancel.
@@ -161,12 +169,14 @@ def test_the_bracket_of_exact_steps_is_no_narrower_than_the_bar_of_the_eigenvalu
 
 
 def test_the_conditions_are_those_of_the_eigenvalues() -> None:
-    rng, seen = np.random.default_rng(31), set[bool]()
+    rng = np.random.default_rng(31)
+    seen = set[bool]()
     for _ in range(200):
         tables = drawn(rng)[0]
         case = make(tables)
         system = system_of(case)
-        k, grip = system.contact_stiffness, math.copysign(system.coefficients.phi, system.belt_speed)
+        k = system.contact_stiffness
+        grip = math.copysign(system.coefficients.phi, system.belt_speed)
         growth = modes(system.coefficients, k, grip)[0].growth
         size = math.sqrt((system.coefficients.c_xx + system.coefficients.c_yy + k) / system.coefficients.m)
         if (

@@ -64,6 +64,7 @@ WORKER_MARGIN = 10_000_000
 @pytest.mark.parametrize(("points", "compute"), [(100_000, "quick"), (30_000, "compute_units")])
 @campaign
 def test_many_points_need_no_more_memory_than_a_thousand(tmp_path: Path, points: int, compute: str) -> None:
-    few, many = memory_of(tmp_path, 1000, compute), memory_of(tmp_path, points, compute)
+    few = memory_of(tmp_path, 1000, compute)
+    many = memory_of(tmp_path, points, compute)
     assert many["parent"] < few["parent"] + POINT_BYTES * (points - 1000)
     assert many["workers"] < few["workers"] + WORKER_MARGIN

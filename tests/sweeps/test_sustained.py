@@ -198,7 +198,8 @@ def test_what_bounces_ever_higher_beside_stable_sliding_lasts() -> None:
     assert answer.sustained is not None
     assert 1.9 < answer.sustained < 1.92
     case = make(STEEP, friction__coefficient=1.92)
-    flow, shoe = SmoothFlow.of(system_of(case)), Shoe.of(system_of(case))
+    flow = SmoothFlow.of(system_of(case))
+    shoe = Shoe.of(system_of(case))
     assert shoe.rest is not None
     end = on_smooth_pads(shoe, system_of(case).initial.beside(shoe.rest))
     assert end.state is not None
@@ -238,7 +239,8 @@ def test_without_a_common_period_a_vibration_lasts_that_keeps_its_amplitude(
 def test_the_vibration_that_lasts_lowest_down_is_handed_on() -> None:
     critical = Critical(parameter="friction.coefficient", lower=0.3, upper=0.9)
     answers = Answers(explored(critical, make(SQUEAL)).explored, None)
-    answer, line = sustained(answers, 1e-2, Search(Outcome.UNSTABLE)), answers.line
+    answer = sustained(answers, 1e-2, Search(Outcome.UNSTABLE))
+    line = answers.line
     assert answer.outcome is Outcome.FOUND
     assert answer.value is not None
     assert answer.state is not None

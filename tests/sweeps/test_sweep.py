@@ -59,7 +59,8 @@ def test_a_point_is_the_case_with_its_values(tmp_path: Path) -> None:
     text += "[roughness.wheel]\namplitudes = [1e-6]\norders = [40]\n"
     axes = (("wheel.radius", "[0.4, 0.6]"), ("link2.stiffness", "[1e7, 3e8]"))
     tables = [f'[[axis]]\nparameter = "{key}"\nvalues = {values}\n' for key, values in axes]
-    plan, intervals = load(tmp_path, 'case = "tiny.toml"\n' + "".join(tables), text).plan, set()
+    plan = load(tmp_path, 'case = "tiny.toml"\n' + "".join(tables), text).plan
+    intervals = set()
     for point in range(plan.points):
         settings = plan.settings(point)
         alone = parse_case(text, "c", [f"{key_text(path)}={value}" for path, value in settings.items()]).case
@@ -203,7 +204,8 @@ def test_the_wheel_goes_on_turning_from_one_point_to_the_next(tmp_path: Path) ->
     first = simulate(loaded.base.case)
     second = simulate(loaded.plan.case(next_start(first)))
     # Phases pass through degrees, and the second run starts anew from four numbers: rounding, times its growth.
-    end, other = second.motion.rows[-1, :4], whole.motion.rows[-1, :4]
+    end = second.motion.rows[-1, :4]
+    other = whole.motion.rows[-1, :4]
     np.testing.assert_allclose(end, other, rtol=1e-6, atol=1e-9 * np.abs(other).max())
 
 
@@ -214,7 +216,8 @@ def test_along_wavelengths_each_wave_goes_on_with_its_phase(tmp_path: Path) -> N
     loaded = load(tmp_path, text, CASE + waves)
     first = simulate(loaded.base.case)
     nxt = system_of(loaded.plan.case({("roughness", "wheel", "wavelengths"): [0.02], **next_start(first)}))
-    system, case = first.motion.system, loaded.base.case
+    system = first.motion.system
+    case = loaded.base.case
     met = 0.7 * case.wheel.radius + system.belt_speed * system.sampled_duration
     assert np.sin(nxt.wheel.phase[0]) == pytest.approx(np.sin(-2.0 * np.pi * met / 0.013), abs=1e-9)
 
@@ -270,7 +273,8 @@ output.sample_interval = 1e-4
     axis = '[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.2, 1.0, 2.0, 3.4]\ndirection = "both"\n'
     report = run(tmp_path, 'case = "tiny.toml"\n' + axis, case.replace("step = 2e-5", steps))
     found = opened(tmp_path / "sweep.h5")
-    up, down = found.sel(direction="up"), found.sel(direction="down")
+    up = found.sel(direction="up")
+    down = found.sel(direction="down")
     assert list(up.regime.values[:3]) == ["damped"] * 3
     assert list(down.regime.values[1:]) == ["relaxation"] * 3
     assert list(found.hysteresis.values[1:3]) == [1, 1]
@@ -408,7 +412,8 @@ def test_tasks_are_as_long_as_their_work_is_short() -> None:
 
 
 def test_tasks_of_long_sweeps_last_a_second_and_get_shorter_towards_the_end() -> None:
-    queue, sizes = TaskQueue(np.zeros(10**5, dtype=bool), None, workers=4), list[int]()
+    queue = TaskQueue(np.zeros(10**5, dtype=bool), None, workers=4)
+    sizes = list[int]()
     queue.note_time(Task(0, 1000), 4.0)
     while (task := queue.next_task()) is not None:
         sizes.append(task.size)

@@ -78,7 +78,8 @@ def test_their_numbers_are_those_of_runs_alone(tmp_path: Path, num: int) -> None
 
 
 def test_what_a_sweep_leaves_out_of_a_verdict_changes_nothing_that_it_keeps(tmp_path: Path) -> None:
-    loaded, kept = rough(tmp_path, 5), [field for field in fields.POINT if field.at.startswith("verdict.")]
+    loaded = rough(tmp_path, 5)
+    kept = [field for field in fields.POINT if field.at.startswith("verdict.")]
     assert len(kept) > 8
     for point in range(1, loaded.plan.points):
         system = system_of(loaded.plan.case(loaded.plan.settings(point)))
@@ -98,11 +99,14 @@ def say_the_same(cases: list[Case]) -> int:
     Each amplitude is off by what both promise of the largest x.
     """
     known = [checked(case) for case in cases]
-    systems, lanes = [each.system for each in known], 0
+    systems = [each.system for each in known]
+    lanes = 0
     found = judged_together(systems, certify_together(systems, may_suffice))
     for case, each, (by_lanes, theory) in zip(cases, known, found, strict=True):
-        point, run = judged(case, each, by_lanes, theory, whole=False), simulate(case)
-        one, other = point.verdict, run.verdict
+        point = judged(case, each, by_lanes, theory, whole=False)
+        run = simulate(case)
+        one = point.verdict
+        other = run.verdict
         assert (one.regime, one.excitation, one.settled) == (other.regime, other.excitation, other.settled)
         assert one.frequency == other.frequency  # no lane has one
         errors = [each.certificate.estimated_error for each in (point, run) if each.certificate is not None]
@@ -117,7 +121,8 @@ def say_the_same(cases: list[Case]) -> int:
 @pytest.mark.parametrize("every", counts(20, 1))
 def test_a_point_whose_pad_opens_says_what_a_run_of_it_says(name: str, every: int) -> None:
     """Its regime takes powers, and its amplitude turning points, which no lane has."""
-    found, cases = OPENING[name], list[Case]()
+    found = OPENING[name]
+    cases = list[Case]()
     for friction, speed in product(found["frictions"], found["speeds"]):
         tables = {**found["case"], "friction": {"coefficient": friction}}
         tables["wheel"] = {**tables["wheel"], "angular_speed": speed}
@@ -178,7 +183,8 @@ def test_a_motion_that_overflows_takes_no_verdict_from_the_others() -> None:
 @pytest.mark.parametrize("shoes", counts(3, 60))
 def test_their_promises_are_kept(shoes: int) -> None:
     """Beside event-driven runs of random shoes whose pads open in part; a shoe that sticks has left its lane."""
-    rng, kept = np.random.default_rng(8), 0
+    rng = np.random.default_rng(8)
+    kept = 0
     systems = [
         system_of(
             make(

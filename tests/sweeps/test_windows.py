@@ -50,8 +50,12 @@ TONGUES: dict[str, Any] = {  # a wave of the wheel, whose slope feeds vibration 
 def exact_growth(tables: dict[str, Any], **changes: Any) -> float:
     """ln of the largest multiplier over a period of the wheel (1/s), in a contact that touches everywhere."""
     system = system_of(make(tables, **changes))
-    c, load, belt, a = system.coefficients, system.load_at_start, system.belt_speed, system.half_length
-    stiffness, phi = system.contact_stiffness, math.copysign(c.phi, belt)
+    c = system.coefficients
+    load = system.load_at_start
+    belt = system.belt_speed
+    a = system.half_length
+    stiffness = system.contact_stiffness
+    phi = math.copysign(c.phi, belt)
     g, omega, phase = (np.array(each) for each in (system.wheel.g, system.wheel.omega, system.wheel.phase))
     height = g * np.sinc(omega * a / math.pi)
     period = 2.0 * math.pi / (omega.min() * abs(belt))
@@ -60,7 +64,8 @@ def exact_growth(tables: dict[str, Any], **changes: Any) -> float:
     pull = np.array([phi, 1.0])
 
     def slope(t: float, z: Any) -> Any:
-        state, tangent = z[:4], z[4:].reshape(4, 4)
+        state = z[:4]
+        tangent = z[4:].reshape(4, 4)
         angle = omega * (state[0] - belt * t) + phase
         force = stiffness * (height @ np.sin(angle) - state[1])
         by_place = stiffness * np.array([height * omega @ np.cos(angle), -1.0])
@@ -91,7 +96,8 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
     printed = brakecli("sweep", "s.toml", "-j", "1", "--json", cwd=tmp_path).json
     with xr.open_dataset(tmp_path / "s.h5", engine="h5netcdf") as result:
         assert result.critical_windows_lower.dims == ("link1_damping", "window")
-        lower, upper = result.critical_windows_lower.values, result.critical_windows_upper.values
+        lower = result.critical_windows_lower.values
+        upper = result.critical_windows_upper.values
     for stored, name in ((lower, "critical_windows_lower"), (upper, "critical_windows_upper")):
         assert printed[name] == [[None if math.isnan(value) else value for value in row] for row in stored]
     np.testing.assert_array_equal(np.isnan(lower), [[False, False], [False, True]])
@@ -114,7 +120,8 @@ def test_two_windows_of_a_passing_wave_are_found_stored_printed_and_drawn(tmp_pa
 def listed_ends(tables: dict[str, Any], key: str, range_: tuple[float, float]) -> tuple[Search, list[float]]:
     """The windows that a search finds, and all special points of the branches that it follows."""
     lower, upper = range_
-    name, width = key.replace("__", "."), upper - lower
+    name = key.replace("__", ".")
+    width = upper - lower
     critical = Critical(parameter=name, lower=lower, upper=upper, tolerance=1e-3 * width)
     answers = Answers(explored(critical, make(tables, **{key: lower})).explored, None)
     return on_waves(critical, answers), [mark.value for base in answers.bases for mark in base.special]
@@ -187,7 +194,8 @@ def test_a_branch_that_others_go_on_with_is_not_lost() -> None:
     """Two ends of branches run along a third one, and close the gap between them."""
     tables, *_ = opening(60297, "opening")
     case = make(tables, friction__coefficient=2.372)
-    low, high = 0.7 * case.link1.stiffness, 1.5 * case.link1.stiffness
+    low = 0.7 * case.link1.stiffness
+    high = 1.5 * case.link1.stiffness
     critical = Critical(parameter="link1.stiffness", lower=low, upper=high, tolerance=1e-3 * (high - low))
     answers = Answers(explored(critical, case).explored, None)
     answer = on_waves(critical, answers)
@@ -220,13 +228,15 @@ def test_where_no_motion_was_found_a_window_ends_anywhere_and_a_note_says_so(
     """Growth of up to 557 1/s lasts to the end of the range."""
     shoe = SHOES["lost"]
     (tmp_path / "case.toml").write_text(tomli_w.dumps(shoe["case"]))
-    (lower, upper), key = shoe["range"], shoe["key"]
+    lower, upper = shoe["range"]
+    key = shoe["key"]
     table = {"parameter": key, "lower": lower, "upper": upper, "tolerance": 1e-3}
     (tmp_path / "s.toml").write_text(tomli_w.dumps({"case": "case.toml", "critical": table}))
     printed = brakecli("sweep", "s.toml", "--json", cwd=tmp_path).json
     assert any("a window of instability ends anywhere from" in each for each in printed["findings"])
     found = search(Critical(**table), Line(make(shoe["case"]), [key], lower, upper))
-    [(begin, end)], [(_, error)] = found.windows, found.window_errors
+    [(begin, end)] = found.windows
+    [(_, error)] = found.window_errors
     assert begin == pytest.approx(shoe["critical"], abs=found.error)
     assert end == upper
     assert 1.0 < error < end - begin

@@ -61,7 +61,8 @@ def bursts(values: Array, interval: float) -> list[Burst]:
 
 def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
     """First sample, frequency (1/sample) and power of the tone of each frame in which one stands out."""
-    window, ramp = np.hanning(size), np.linspace(0.0, 1.0, size)
+    window = np.hanning(size)
+    ramp = np.linspace(0.0, 1.0, size)
     frequencies = np.fft.rfftfreq(size).astype(np.float64)
     for first in range(0, len(values) - size + 1, size // 2):
         part = values[first : first + size]
@@ -79,16 +80,21 @@ def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
 
 def _burst(values: Array, interval: float, size: int, group: list[tuple[int, float, float]]) -> Burst | None:
     """The burst of neighbouring frames, with its ends where the tone's amplitude is half."""
-    begin, end = group[0][0], group[-1][0] + size
+    begin = group[0][0]
+    end = group[-1][0] + size
     weights = np.array([power for *_, power in group])
     frequency = float(np.average([f for _, f, _ in group], weights=weights))
-    low, high = max(0, begin - size), min(len(values), end + size)
+    low = max(0, begin - size)
+    high = min(len(values), end + size)
     piece = values[low:high] - np.linspace(values[low], values[high - 1], high - low)
-    lines, half = np.fft.fftfreq(len(piece)), max(_SAME * frequency, _LOBE / size)
+    lines = np.fft.fftfreq(len(piece))
+    half = max(_SAME * frequency, _LOBE / size)
     tone = np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
     amplitude = uniform_filter1d(2.0 * np.abs(tone), max(1, min(size // 4, int(2 / frequency))))
-    first, last = begin - low, end - low
-    first, last = first + _edge(amplitude[first : first + size]), last - _edge(amplitude[last - size : last][::-1])
+    first = begin - low
+    last = end - low
+    first = first + _edge(amplitude[first : first + size])
+    last = last - _edge(amplitude[last - size : last][::-1])
     if (last - first) * frequency < _CYCLES / 2:
         return None
     turn = np.angle(np.vdot(tone[first : last - 1], tone[first + 1 : last]))

@@ -43,7 +43,10 @@ def verdicts(shown: Sequence[Shown], *, in_full: bool = True) -> list[Verdict]:
 
 def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *, in_full: bool) -> Verdict:
     """The verdict on one history."""
-    part, radius, cycles, look = what.part, shown.context.radius, what.cycles, shown.seen
+    part = what.part
+    radius = shown.context.radius
+    cycles = what.cycles
+    look = shown.seen
     moves = not found.few_samples and found.moves and look.largest_level > 0.0  # velocities may all be 0
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
@@ -85,7 +88,8 @@ def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *,
 
 def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, Any]:
     """Evidence on the settled part that no row needs."""
-    part, belt = what.part, context.belt_speed
+    part = what.part
+    belt = context.belt_speed
     evidence: dict[str, Any] = {f"amplitude_{name}": part.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = part.extremes("vx")[int(belt > 0.0)] / belt

@@ -25,7 +25,9 @@ _SHORTEST = 8  # samples in which noise can be told
 _SIDE = 24  # samples before and behind, the louder of which a spike has to leave; a choice
 _OUTER_DEVIATIONS = 1.645  # standard deviations that a tenth of normal numbers leave their middle by
 _BESIDE = 3.0  # times what its neighbours leave the median by, beyond which a sample is alone
-_FEWEST_PULSES, _ONE_WAY = 5, 0.6  # spikes, and their mean sign, from which on they may be pulses of slip
+# spikes, and their mean sign, from which on they may be pulses of slip
+_FEWEST_PULSES = 5
+_ONE_WAY = 0.6
 _SHORT_GAP = 0.25  # of a cycle: a straight line over it changes no turning point by much
 _DRIFTS = 0.1  # drift over the motion, both in standard deviations, from which on it is reported
 DEVIATION = 1.4826  # standard deviation of a normal distribution over the median of the distances from its middle
@@ -131,7 +133,8 @@ def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocit
     width = int(_DRIFT_CYCLES * max(cycle, _cycle(velocity))) if len(velocity.values) >= _SHORTEST else 0
     if not 0 < 2 * width <= len(velocity.values):
         return velocity
-    drift, m = uniform_filter1d(velocity.values, width), velocity.quiet
+    drift = uniform_filter1d(velocity.values, width)
+    m = velocity.quiet
     variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
     if float(drift.std()) > _DRIFTS * float(np.sqrt(max(variance, 0.0))):
         notes.append("drift removed")
@@ -140,7 +143,8 @@ def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocit
 
 def _velocity(values: Array, is_velocity: bool) -> Velocity:
     """Velocity with its noise, the lesser of what third differences and the spectrum's floor allow."""
-    raw, noise = values if is_velocity else np.diff(values), 0.0
+    raw = values if is_velocity else np.diff(values)
+    noise = 0.0
     mean = float(raw.mean()) if len(raw) else 0.0
     if len(values) >= _SHORTEST:
         rough = np.diff(values, 3)  # has 20 times the variance of noise, whose median size is 0.6745 deviations
@@ -166,7 +170,8 @@ def _without_slow(values: Array) -> Array:
 
 def bridged(values: Array) -> Array:
     """Gaps filled by straight lines."""
-    good, places = np.isfinite(values), np.arange(len(values))
+    good = np.isfinite(values)
+    places = np.arange(len(values))
     return values if good.all() else np.interp(places, places[good], values[good])
 
 

@@ -60,7 +60,8 @@ def forced_linear(shown: Sequence[Shown], decays: Sequence[float]) -> list[Lasti
     added = at_once(starts, lambda at: (0.5 * np.ptp(own[at, starts[at[0]] :], axis=1)).tolist())
     for each, swing, adds in zip(found, (0.5 * np.ptp(lasting, axis=1)).tolist(), added, strict=True):
         if each is not None:
-            each.own, each.spread = adds, adds + each.amplitude - swing if each.settled else None
+            each.own = adds
+            each.spread = adds + each.amplitude - swing if each.settled else None
     return found
 
 
@@ -92,7 +93,8 @@ class _Gone(NamedTuple):
 
 def _gone(shown: Sequence[Shown], decays: Sequence[float], own: Array, forced: Array) -> list[_Gone]:
     """What becomes of what each shoe adds (in rows), which decays (1/s), beside what is forced."""
-    starts, within = -(-own.shape[1] * np.arange(WINDOWS) // WINDOWS), shown[0].limits.settled_within
+    starts = -(-own.shape[1] * np.arange(WINDOWS) // WINDOWS)
+    within = shown[0].limits.settled_within
     high, low = (each.reduceat(own, starts, axis=1) for each in (np.maximum, np.minimum))
     left = 0.5 * (high - low)
     end = 0.5 * (high[:, -LAST:].max(axis=1) - low[:, -LAST:].min(axis=1))  # a window may be shorter than a period
@@ -110,9 +112,11 @@ def _closed(shown: Shown, theory: Linear, decay: float, forced: float, gone: _Go
     if gone.stays and gone.end >= _REST * forced:
         return None
     found = Lasting(shown.judged, False, forced, None, forced)
-    begin, slow = gone.window * shown.samples // WINDOWS, shown.slowest(0.0)
+    begin = gone.window * shown.samples // WINDOWS
+    slow = shown.slowest(0.0)
     if gone.window <= WINDOWS - LAST and shown.duration - begin * shown.interval >= 2.0 * slow:
-        found.part, found.settled = shown.part(begin), True
+        found.part = shown.part(begin)
+        found.settled = True
     else:
         late = shown.duration + _wait(decay, gone)
         needed = max(_LONGER * late, ROOM * (late + 2.0 * slow))

@@ -17,9 +17,11 @@ def _neighbours(a: Answers, t: Thresholds) -> tuple[float, float]:
     A line through the logarithms knows them better where they swing, and worse where they wander: it counts where
     the growth itself lies within its error of it.
     """
-    rate, error = a.exponent, a.exponent_error
+    rate = a.exponent
+    error = a.exponent_error
     if math.isfinite(error) and a.even_error < error and abs(a.even - rate) <= error:
-        rate, error = a.even, a.even_error
+        rate = a.even
+        error = a.even_error
     return a.powers(rate), t.sure_errors * a.powers(error)
 
 

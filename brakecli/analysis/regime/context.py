@@ -59,7 +59,8 @@ class Context(NamedTuple):
 
 def context(system: System, theory: Theory | None = None) -> Context:
     """What a verdict has to know of a system, the theory of which may be known already."""
-    belt, c = float(value_at(system.belt, system.sampled_duration)), system.coefficients
+    belt = float(value_at(system.belt, system.sampled_duration))
+    c = system.coefficients
     compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
 
     @cache
@@ -72,7 +73,8 @@ def context(system: System, theory: Theory | None = None) -> Context:
             return system.contact_stiffness
 
     theory = theory or theory_of(system)
-    turns, highest = tuple(system.wheel.turns.tolist()), 0.5 / system.interval
+    turns = tuple(system.wheel.turns.tolist())
+    highest = 0.5 / system.interval
     swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
     fastest = compression * system.natural_frequencies[1]
@@ -100,6 +102,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
 
 def _steadier(system: System) -> str:
     """What to do where no disturbance grows by the scheme at its step; empty where one does."""
-    k, phi = system.contact_stiffness, system.coefficients.phi
+    k = system.contact_stiffness
+    phi = system.coefficients.phi
     grows = system.method.own_steps or spectral_radius(system, k, phi) > 1.0
     return "" if grows else without_damping(system.method)

@@ -22,7 +22,9 @@ _SAME = 0.035  # squared difference, over twice the variance, between one period
 _AS_SAME = 4.0  # times the least of these, up to which a shorter period is the period
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 _EARLY = 1 / 8  # of a cycle: where it begins with a stick, a step may place that before its begin
-SIZE_OFF, _PERIOD_OFF = 3.5, 0.2  # of an amplitude and a period, per step in a contact: most that impacts were off
+# of an amplitude and a period, per step in a contact: most that impacts were off
+SIZE_OFF = 3.5
+_PERIOD_OFF = 0.2
 
 
 def median(values: Array) -> tuple[float, float]:
@@ -38,7 +40,8 @@ def swings(events: Events, edges: Array) -> Array:
     places = np.searchsorted(events.time[turns], edges)
     if not np.diff(places).all():
         return np.zeros(0)
-    x, first = events.x[turns][: places[-1]], places[:-1]
+    x = events.x[turns][: places[-1]]
+    first = places[:-1]
     return np.asarray(0.5 * (np.maximum.reduceat(x, first) - np.minimum.reduceat(x, first)))
 
 
@@ -73,7 +76,8 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
     begins, lag = _beginnings(part, events)
     if len(begins) <= _FEWEST:
         return None
-    cycles, interval = len(begins) - 1, part.history.interval
+    cycles = len(begins) - 1
+    interval = part.history.interval
     edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)
     groups = begins[edges]
     period, period_spread = median(np.diff(groups) / np.diff(edges))
@@ -85,8 +89,10 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
         count = np.count_nonzero(events.kind == begin)
         return middle, max(spread, step * count / (events.time[-1] - events.time[0]))
 
-    (stick, stick_spread), (loss, loss_spread) = time_in(STICK, SLIP), time_in(LIFT, TOUCH)
-    frequency, sizes = 1.0 / period, swings(events, begins)
+    stick, stick_spread = time_in(STICK, SLIP)
+    loss, loss_spread = time_in(LIFT, TOUCH)
+    frequency = 1.0 / period
+    sizes = swings(events, begins)
     evidence = {
         "cycles": float(cycles),
         "samples_per_cycle": period / interval,
@@ -99,7 +105,8 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
         "contact_loss_spread": loss_spread,
     }
     amplitude, spread = median(sizes)
-    contact, turn = contact_time(events, groups[0], groups[-1]), 2.0 * np.pi * step / period
+    contact = contact_time(events, groups[0], groups[-1])
+    turn = 2.0 * np.pi * step / period
     impact = step / contact
     kicked = (np.pi * impact) ** 2 / contact / 24.0  # in a second of contact
     alike = _unseen(begins / step)[0] if step else 0.0
@@ -154,7 +161,8 @@ def _force_variation(part: Part, begins: Array, groups: Array) -> float | None:
     An impact of less than a sample is seen in one of them. None where half of the places in a cycle that samples
     see, in turn, show much less, so that all may miss some.
     """
-    edges, first = begins.astype(int), groups[:-1].astype(int) - int(begins[0])
+    edges = begins.astype(int)
+    first = groups[:-1].astype(int) - int(begins[0])
     force = part.history.read("friction_force", edges[0], edges[-1])
     unseen, middle = _unseen(begins)
     place = np.arange(edges[0], edges[-1]) - np.repeat(begins[:-1], np.diff(edges)) + middle
@@ -177,8 +185,11 @@ def _beginnings(part: Part, events: Events) -> tuple[Array, int]:
 
     Rises are told from ripple by the first of `_BANDS` of the level of vx with which it does.
     """
-    turning, level, interval = events.kind <= MIN, part.deviation("vx"), part.history.interval
-    time, mean = events.time[turning], np.diff(part.last("x"))
+    turning = events.kind <= MIN
+    level = part.deviation("vx")
+    interval = part.history.interval
+    time = events.time[turning]
+    mean = np.diff(part.last("x"))
     speed = np.diff(events.x[turning]) / np.maximum(np.diff(time), 1e-300)
     everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in _BANDS]
     for begins in {len(each): each for each in everywhere if len(each) > 1}.values():
@@ -196,8 +207,10 @@ def _unlike(values: Array, lag: float) -> float:
 
     A lag of no whole number of samples (at least one) is met by cubic interpolation.
     """
-    first, a = int(lag) - 1, lag % 1.0
-    inner, outer = 0.5 * (a + 1.0) * (a - 2.0), a * (a - 1.0) / 6.0
+    first = int(lag) - 1
+    a = lag % 1.0
+    inner = 0.5 * (a + 1.0) * (a - 2.0)
+    outer = a * (a - 1.0) / 6.0
     weights = [-outer * (a - 2.0), inner * (a - 1.0), -inner * a, outer * (a + 1.0)]
     later = np.convolve(values[first:], weights[::-1], "valid")
     return float(np.mean((later - values[: len(later)]) ** 2)) / (2.0 * float(values.var()) or 1.0)

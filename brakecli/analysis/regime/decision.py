@@ -120,7 +120,8 @@ class Row(NamedTuple, Generic[A, T]):
 
     def decision(self, answers: A) -> Decision:
         """What it says of these answers; raises UnknownNumberError where they lack a number that it needs."""
-        reason, advice = told(self.sentence, answers), _told_or_nothing(self.remedy, answers)
+        reason = told(self.sentence, answers)
+        advice = _told_or_nothing(self.remedy, answers)
         longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
         return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
 

@@ -92,10 +92,14 @@ class Part:
 
     def deviation(self, name: str) -> Any:
         """Standard deviation of a variable, from sums that begin at its first value."""
-        first, total, square = self.history.read(name, self.start, self.start + 1), 0.0, 0.0
+        first = self.history.read(name, self.start, self.start + 1)
+        total = 0.0
+        square = 0.0
         for piece in self.pieces(name):
             values = piece - first
-            total, square = total + values.sum(axis=-1), square + np.square(values).sum(axis=-1)  # no threads
+            # no threads
+            total = total + values.sum(axis=-1)
+            square = square + np.square(values).sum(axis=-1)
         count = self.stop - self.start
         return np.sqrt(np.maximum(square / count - (total / count) ** 2, 0.0))
 
@@ -106,7 +110,8 @@ class Part:
     def places(self, name: str = "x") -> tuple[Array, Array]:
         """Evenly spaced samples of a variable, not too many, and their times (s)."""
         stride = -(-(self.stop - self.start) // _MOST_PLACES)
-        picked, first = [], self.start
+        picked = []
+        first = self.start
         for begin in range(self.start, self.stop, LONGEST):
             values = self.history.read(name, begin, min(begin + LONGEST, self.stop))
             picked.append(values[..., first - begin :: stride])
@@ -149,7 +154,8 @@ class Part:
         if self.covered(lines) > _MOST_COVERED or self.stop - self.start < FEWEST_SAMPLES // 4:
             return None
         x = self.last("x")
-        window, middle = np.hanning(len(x)), slice(len(x) // 4, 3 * len(x) // 4)
+        window = np.hanning(len(x))
+        middle = slice(len(x) // 4, 3 * len(x) // 4)
         spectrum = np.fft.rfft(x * window)
         chosen = _near(lines, np.fft.rfftfreq(len(x), self.history.interval))
         chosen[: LINE_BINS // 2] = True
@@ -174,7 +180,9 @@ class Part:
         None where vx (m/s) is quiet: that is rounding.
         """
         frequencies, power, total = self._spectrum
-        left, found, chosen = power.copy(), list[tuple[float, float, float]](), _near(forced, frequencies)
+        left = power.copy()
+        found = list[tuple[float, float, float]]()
+        chosen = _near(forced, frequencies)
         total = total if self.amplitude("vx") > quiet else 0.0
         while total > 0.0 and len(found) < _MOST_LINES:
             top = int(np.argmax(left))
@@ -217,7 +225,8 @@ def _evenly(count: int) -> tuple[Array, float]:
 
 def trend(values: Array) -> tuple[Any, Any]:
     """Change of evenly spaced values over their record, by a line of least squares, and its standard error."""
-    (away, squares), rest = _evenly(values.shape[-1]), values - values.mean(axis=-1, keepdims=True)
+    away, squares = _evenly(values.shape[-1])
+    rest = values - values.mean(axis=-1, keepdims=True)
     slope = np.vecdot(away, rest) / squares
     rest = rest - slope[..., None] * away
     return slope, np.sqrt(np.vecdot(rest, rest) / squares / (values.shape[-1] - 2))

@@ -18,7 +18,9 @@ from brakecli.solver.alike import at_once
 from brakecli.solver.history import History, stacked
 
 _LIKELY = 16  # waves, of which one moves x most
-_FEWEST_PIECES, _PIECES = 4, 16  # of a settled part, in which the friction force is compared
+# of a settled part, in which the friction force is compared
+_FEWEST_PIECES = 4
+_PIECES = 16
 _WIDER = 1.02  # times as far as in the last half of them, a transient swings
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _DRIFT = 5e-3  # by which amplitude or frequency of a settled limit cycle may change
@@ -79,7 +81,8 @@ def _lasting(
     _add_ripple(shown, found, lines)
     if found.spread is not None and 0.0 < found.amplitude <= found.spread:  # then not even its order is known
         found.notes["settled"] = found.notes.get("settled") or (_VAGUE if found.settled else None)
-        found.spread, found.settled = None, False
+        found.spread = None
+        found.settled = False
     return found
 
 
@@ -102,7 +105,9 @@ def _holds_two(shown: Shown, part: Part) -> bool:
 
 def _forced(shown: Shown, answers: Answers) -> Lasting:
     """A forced motion of a pad that opens: its cycle is the slowest wave, or the slowest beat."""
-    part, interval, history = shown.judged, shown.history.interval, shown.history
+    part = shown.judged
+    interval = shown.history.interval
+    history = shown.history
     rate = -answers.exponent if math.isfinite(answers.exponent) else -shown.context.growth()
     fading = 0.25 * shown.duration * rate < RELAXED  # too slowly to be seen within a quarter of the run
     chaos = math.isfinite(answers.exponent) and answers.exponent > 0.0
@@ -116,7 +121,8 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
         text = f"what the shoe adds dies away at only {rate:.3g} 1/s"
         found.notes["settled"] = f"{text}: run at least {needed:.3g} s to see the amplitude that lasts"
     elif found.settled and seconds < (beat := shown.beat()):
-        found.settled, found.notes["beat"] = False, f"the waves beat every {beat:.3g} s: run longer"
+        found.settled = False
+        found.notes["beat"] = f"the waves beat every {beat:.3g} s: run longer"
     end = part.stop * interval
     begin = max(part.start * interval, shown.track.since)
     period = max(min(shown.beat(), end - begin), interval)
@@ -144,7 +150,8 @@ def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
 
     From there on it swings no wider, within pieces of the settled part, than in the last half of them.
     """
-    part, interval = found.part, shown.history.interval
+    part = found.part
+    interval = shown.history.interval
     seconds = max(shown.context.pattern, shown.beat())
     count = min(int((part.stop - part.start) * interval / seconds), _PIECES) if seconds else 0
     if count < _FEWEST_PIECES:
@@ -162,7 +169,9 @@ def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
 
 def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     """A vibration that lasts by itself: medians of its cycles, with what a drift becomes in the spreads."""
-    part, seconds, interval = shown.judged, answers.seconds, shown.history.interval
+    part = shown.judged
+    seconds = answers.seconds
+    interval = shown.history.interval
     rate = 0.0 if answers.undamped else min(abs(answers.growth), shown.context.settles)
     if math.isfinite(answers.rate_without_waves):
         rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
@@ -192,7 +201,8 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
         text = f"the waves beat every {beat:.3g} s: run at least {ROOM * (part.start * interval + beat):.3g} s"
         text += " for numbers that last"
-    found.settled, found.notes["settled"] = lasts and text is None, text
+    found.settled = lasts and text is None
+    found.notes["settled"] = text
 
     def held(spread: float, value: float, drift: tuple[float, float]) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
@@ -229,7 +239,8 @@ def _surely(change: tuple[float, float], limits: Thresholds) -> float:
 
 def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
     """What nodes and steps change in a motion forced on lines (Hz), or in one that lasts by itself."""
-    context, part = shown.context, found.part
+    context = shown.context
+    part = found.part
     opens = shown.seen.full_from > part.start  # otherwise it has none
     ripple = context.ripple(part, lines) if opens and not found.cycles else None
     if found.spread is not None and lines and not (shown.linear and found.forced == found.amplitude):
@@ -237,7 +248,8 @@ def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
     if ripple and ripple.counts:
         found.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
         found.longer &= not found.settled
-        found.notes["ripple"], found.settled = ripple.sentence, False
+        found.notes["ripple"] = ripple.sentence
+        found.settled = False
 
 
 def _forces(histories: Sequence[History], alike: Lasting) -> list[tuple[float, float]]:
@@ -249,9 +261,11 @@ def _forces(histories: Sequence[History], alike: Lasting) -> list[tuple[float, f
 
 def _add_force(shown: Shown, found: Lasting, mean: float, variation: float, *, lasts: bool) -> None:
     """Add mean and variation of the friction force, and why it is missing or may be too small."""
-    interval, pattern = shown.interval, shown.context.pattern
+    interval = shown.interval
+    pattern = shown.context.pattern
     seconds = (shown.samples - max(found.part.start, found.force_from)) * interval
-    found.mean_force, found.variation = mean, variation
+    found.mean_force = mean
+    found.variation = variation
     if found.cycles:
         found.variation = found.cycles.force_variation
         if found.variation is None:

@@ -52,8 +52,11 @@ class Shown:
     def __init__(self, given: Given, seen: Seen, limits: Thresholds) -> None:
         """Take a motion, and what all its samples show."""
         self.history, self.context, *_ = self.given = given
-        self.seen, self.limits, self.track = seen, limits, given.track
-        self.samples, self.interval = self.history.samples, self.history.interval
+        self.seen = seen
+        self.limits = limits
+        self.track = given.track
+        self.samples = self.history.samples
+        self.interval = self.history.interval
         self.duration = self.samples * self.interval
         self.half, self.quarter = self.samples // 2, last_quarter(self.samples)
         self.judged_from = seen.settled_from or self.half
@@ -78,7 +81,8 @@ class Shown:
     @cached_property
     def linear(self) -> Linear | None:
         """The theory, where the motion has long been linear at last."""
-        theory, slow = self.context.linear(), self.slowest(0.0)
+        theory = self.context.linear()
+        slow = self.slowest(0.0)
         if theory is None:
             return None
         start = max(min(self.quarter, self.samples - int(slow / self.interval)), 0)
@@ -170,8 +174,12 @@ def _beat(counts: tuple[float, ...]) -> float:
 
 def answers(shown: Shown) -> Answers:
     """The record of answers; what the motion comes to is asked only where a row may need it."""
-    context, seen, (exponent, failure) = shown.context, shown.seen, (shown.given.exponent, shown.given.failure)
-    stands, waves = context.belt_speed == 0.0, bool(context.forced)
+    context = shown.context
+    seen = shown.seen
+    exponent = shown.given.exponent
+    failure = shown.given.failure
+    stands = context.belt_speed == 0.0
+    waves = bool(context.forced)
     found: dict[str, Any] = {
         "failure": failure,
         "duration": shown.duration,
@@ -227,7 +235,8 @@ def _lasts(shown: Shown, found: Answers) -> bool:
 
 def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
     """What has to be known of a motion that is not linear."""
-    context, found = shown.context, dict[str, Any](growth=shown.context.growth())
+    context = shown.context
+    found = dict[str, Any](growth=shown.context.growth())
     if not context.frictionless:
         alone = shown.given.continued()
         names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))

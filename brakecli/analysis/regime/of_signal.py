@@ -96,7 +96,8 @@ def look(
 
     `belt_speed` in m/s, `stiffness` in N/m (of a force) where known.
     """
-    step, known = signal.interval, (quantity, belt_speed, stiffness, thresholds)
+    step = signal.interval
+    known = (quantity, belt_speed, stiffness, thresholds)
     found = _judge(signal, *known)
     tones = tuple(bursts(without_spikes(signal.values, quantity.order), step))
     verdict = replace(found.verdict, bursts=tones)
@@ -108,7 +109,8 @@ def look(
 
 def _of_bursts(signal: Signal, known: _Known, whole: SignalVerdict) -> SignalVerdict:
     """The verdict where tones come and go: that of the strongest burst, if those like it have most energy."""
-    tones, step = whole.bursts, signal.interval
+    tones = whole.bursts
+    step = signal.interval
     burst = max(tones, key=lambda tone: tone.energy)
     like = [tone for tone in tones if abs(tone.frequency - burst.frequency) <= _ALIKE * burst.frequency]
     when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s"
@@ -138,7 +140,9 @@ def _judge(
 ) -> SignalLook:
     """The verdict on a whole signal."""
     size = float(np.nanmax(np.abs(signal.values), initial=0.0)) or 1.0  # squares of the smallest must not vanish
-    order, step, certain = quantity.order, signal.interval, thresholds.skewness_certain
+    order = quantity.order
+    step = signal.interval
+    certain = thresholds.skewness_certain
     velocity, notes = cleaned(signal.values / size, order)
     known = {Measurand.FORCE: stiffness, Measurand.TORQUE: None, Measurand.PRESSURE: None}.get(quantity, 1.0)
     spring = math.nan if known is None else known
@@ -150,7 +154,9 @@ def _judge(
     heard = Heard(velocity, slips, belt, thresholds)
     found = answers(heard, has_belt=quantity is not Measurand.PRESSURE)
     decision = decide(found, thresholds)
-    per_second, stick, slipping = None, None, decision.row == "slips"
+    per_second = None
+    stick = None
+    slipping = decision.row == "slips"
     if decision.regime in _SUSTAINED:
         per_second = (slips.often if slipping else heard.line) / step
         if slipping or found.knows_belt:

@@ -19,7 +19,9 @@ from brakecli.solver.steady_sliding import forces_along
 from brakecli.solver.system import System
 
 _FINER = 4
-_FEWEST, _MOST_SAMPLES = 5, 1024  # a window of fewer holds next to nothing
+# a window of fewer holds next to nothing
+_FEWEST = 5
+_MOST_SAMPLES = 1024
 _MOST_WORK = 1 << 24  # values of waves at nodes
 _LEAST = 0.05  # part of a number from which on it is said
 _STIFFNESSES = np.geomspace(0.8, 1.25, 33)  # of a pad that opens, over the mean one of steady sliding
@@ -68,13 +70,17 @@ def ripple(
     finer = np.zeros(samples)
     forces_along(np.ascontiguousarray(y), travel, layer, finer)
     stiffness = stiffness_of()
-    c, window, added = system.coefficients, np.hanning(samples), force - finer
+    c = system.coefficients
+    window = np.hanning(samples)
+    added = force - finer
     grip = c.grip(belt)
     omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
     off, *seen = (np.fft.rfft((each - each.mean()) * window) for each in (added, x, v_x, force))
     (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
-    a, b = s_xx - c.m * omega**2 + 1j * omega * c.b_xx, s_xy + 1j * omega * c.b_xy
-    d, e = s_yx + 1j * omega * c.b_xy, s_yy - c.m * omega**2 + 1j * omega * c.b_yy
+    a = s_xx - c.m * omega**2 + 1j * omega * c.b_xx
+    b = s_xy + 1j * omega * c.b_xy
+    d = s_yx + 1j * omega * c.b_xy
+    e = s_yy - c.m * omega**2 + 1j * omega * c.b_yy
     if not (determinant := a * e - b * d).all():  # nothing holds the shoe
         return None
     shaken = (grip * e - b) / determinant * off
@@ -86,7 +92,10 @@ def ripple(
     swing = 0.5 * float(np.ptp(np.fft.irfft(shaken, samples)))
     if lines and max(in_x, in_vx, in_force) >= _LEAST:
         (beside, own), (vx, _), (pressing, _) = (part.beside(name, lines) for name in ("x", "vx", "normal_force"))
-        in_x, in_vx, in_force, swing = max(in_x, beside), max(in_vx, vx), max(in_force, pressing), max(swing, own)
+        in_x = max(in_x, beside)
+        in_vx = max(in_vx, vx)
+        in_force = max(in_force, pressing)
+        swing = max(swing, own)
     return Ripple(in_x, in_vx, in_force, swing, system.nodes)
 
 
@@ -99,12 +108,15 @@ def detuned(
     """
     if system.method.own_steps or system.method.step is None or not lines:
         return 0.0
-    c, x, ordered = system.coefficients, part.last("x"), np.unique(lines)
+    c = system.coefficients
+    x = part.last("x")
+    ordered = np.unique(lines)
     size = np.abs(np.fft.rfft(x * np.hanning(len(x)))[1:]) ** 2
     found = np.fft.rfftfreq(len(x), part.history.interval)[1:]
     energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), found), size, len(ordered))
     held = np.minimum(_STIFFNESSES * stiffness(), system.contact_stiffness)
-    grip, omega = c.grip(belt), 2.0 * math.pi * ordered[:, None, None]
+    grip = c.grip(belt)
+    omega = 2.0 * math.pi * ordered[:, None, None]
     values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, each, grip) / c.m) for each in held])
     beside = (omega / np.maximum(np.abs(1j * omega - values), 1e-9 * omega)).sum(axis=2).max(axis=1)
     change = (omega[:, 0, 0] * system.step) ** 2 * (0.25 + beside / 12.0)

@@ -58,7 +58,8 @@ def seen(histories: Sequence[History], within: float) -> list[Seen]:
 def _columns(history: History, within: float) -> list[NDArray[Any]]:
     """The numbers of `Seen`, of each of many histories."""
     samples = history.samples
-    (first, last), whole = tenths(samples), Part(history, 0, samples)
+    first, last = tenths(samples)
+    whole = Part(history, 0, samples)
     state = history.read("state", samples - 1, samples)
     quarter = Part(history, last_quarter(samples), samples)
     parts = Part(history, 0, first), Part(history, last, samples), Part(history, samples // 2, samples), quarter
@@ -109,7 +110,8 @@ def _final(values: Array) -> Array:
 def _settled_window(windowed: tuple[Array, Array, Array], within: float, reach: float) -> NDArray[np.int_]:
     """The windows, never the first, from which on all are settled; 0 where fewer than the last quarter are."""
     vx, least, largest = windowed
-    final, span = _final(vx), _final(largest - least)
+    final = _final(vx)
+    span = _final(largest - least)
     settled = np.abs(vx - final[:, None]) <= within * final[:, None]
     for bound in (least, largest):
         settled &= np.abs(bound - _final(bound)[:, None]) <= reach * span[:, None]

@@ -35,11 +35,16 @@ _GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
 _UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _MOST_SAMPLES = 50_000_000
 _CHUNK_NAME = 4  # bytes, of which there are none at the end
-_INTEGERS, _FLOATS, _EXTENSIBLE = 1, 3, 0xFFFE  # formats of a WAV file whose samples are numbers
+# formats of a WAV file whose samples are numbers
+_INTEGERS = 1
+_FLOATS = 3
+_EXTENSIBLE = 0xFFFE
 _LARGEST = 1e100  # value: its square, and sums of squares, are still finite
 _GRAMS = 1e-3  # kg: a `g` is read as a gram, and means the acceleration of gravity
 _PART = "give a part of the record"
-_NEAREST, _FARTHEST = 1e-12, 1e12  # s between samples
+# s between samples
+_NEAREST = 1e-12
+_FARTHEST = 1e12
 _GAP = 1.5  # steps of this many times the usual one are gaps
 _LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
 
@@ -66,15 +71,19 @@ def read_signal(
     if sample_rate is not None and not 1.0 / _FARTHEST <= sample_rate <= 1.0 / _NEAREST:
         what = "is not a number above 0 Hz (1e-12 to 1e12); give samples per second"
         raise UsageError(f"{argument('sample-rate')} {sample_rate}: {what}")
-    path, inside = Path(source), None
+    path = Path(source)
+    inside = None
     there = os.path.exists(path)  # noqa: PTH110 - pathlib's may raise
     if not there and (found := re.fullmatch(r"(.+?):(/.*)", source)):
-        path, inside = Path(found[1]), found[2]
+        path = Path(found[1])
+        inside = found[2]
     try:
         if time_unit is not None and time_column is None:
             remedy = f"leave it out, or name one with {argument('time-column')}"
             raise UsageError(f"{argument('time-unit')}: is for a column of times; {remedy}")
-        times, name, wanted = [], "", _SI[quantity]
+        times = []
+        name = ""
+        wanted = _SI[quantity]
         if path.suffix.lower() in (".wav", ".wave") and inside is None:
             if time_column is not None:
                 raise UsageError(f"{argument('time-column')}: a sound file has no column of times; leave it out")

@@ -21,7 +21,9 @@ _WIDTHS: tuple[float, ...] = 0.02, 0.01, 0.005  # half widths of a plateau that 
 _NEXT = 3.0  # times that width: what lies within is next to a plateau
 _BIN = 0.01  # of the amplitude, in which the most frequent velocities are counted
 _TAIL = 0.01  # of the time, in which the velocity may go beyond its range
-_SLOWER, _FASTER = 0.95, 1.2  # least and largest velocity, over the belt's, that reaches the belt's just so
+# least and largest velocity, over the belt's, that reaches the belt's just so
+_SLOWER = 0.95
+_FASTER = 1.2
 _WINDOW_CYCLES = 3.0  # fewer cycles in a window do not have a level
 _FEWEST_WINDOWS = 10  # from which on a level has an error, which takes ten batches
 _MOST_HIDDEN = 0.2  # part of a level that noise may hide: beyond, what has died is not told from what lasts
@@ -34,7 +36,10 @@ class Heard:
 
     def __init__(self, velocity: Velocity, slips: Slips, belt: float, limits: SignalThresholds) -> None:
         """Take a velocity, its slips, and the belt's speed as the velocity would show it; nan if not known."""
-        self.velocity, self.slips, self.belt, self.limits = velocity, slips, belt, limits
+        self.velocity = velocity
+        self.slips = slips
+        self.belt = belt
+        self.limits = limits
         self.samples = len(velocity.values)
         certain = slips.skewness >= limits.skewness_certain and slips.stick_slip
         self.smoothing = slips.scale if certain else velocity.quiet
@@ -68,7 +73,8 @@ class Heard:
 
     def level(self) -> dict[str, Any]:
         """Whether it lasts."""
-        velocity, windows = self.velocity, max(self.windows, _FEWEST_WINDOWS)
+        velocity = self.velocity
+        windows = max(self.windows, _FEWEST_WINDOWS)
         levels = velocity.levels(self.smoothing, 0, windows)
         largest = max(float(np.sort(levels)[-3]), 1e-300)
         died_to = float(levels[-(windows // 4) :].mean()) / largest
@@ -99,7 +105,8 @@ class Heard:
 
     def stay(self) -> dict[str, Any]:
         """How long the velocity stays at that of the belt, or at an extreme one."""
-        finer, mean = int(np.ceil(_FINE * self.cycles / self.samples)), self.velocity.mean
+        finer = int(np.ceil(_FINE * self.cycles / self.samples))
+        mean = self.velocity.mean
         clean = self.clean[: _PLATEAU_SAMPLES // finer]
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
         reach = 0.5 * float(np.ptp(np.quantile(clean, [_TAIL, 1.0 - _TAIL]))) or 1.0
@@ -107,7 +114,8 @@ class Heard:
         if not math.isfinite(self.belt):
             # the most frequent values of the lower and of the upper quarter of the range
             edges = clean.min() + _BIN * reach * np.arange(float(np.ptp(clean)) / (_BIN * reach) + 2.0)
-            counts, quarter = np.histogram(clean, edges)[0], max(1, len(edges) // 4)
+            counts = np.histogram(clean, edges)[0]
+            quarter = max(1, len(edges) // 4)
             places = np.array([np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])])
             levels = 0.5 * (edges[places] + edges[places + 1])
         times = [(0.0, 1.0)]  # at a level, and next to it

@@ -8,7 +8,9 @@ from numpy.typing import NDArray
 from brakecli.analysis.spectrum import Array
 
 MULTIPLES = 10  # of a passing frequency that are its lines
-_BANDS, _WIDE = 3, 1.06  # strongest bands, each from its peak over this to its peak times this
+# strongest bands, each from its peak over this to its peak times this
+_BANDS = 3
+_WIDE = 1.06
 _MOST_PAIRED = 2000  # waves; sums of two are lines where there are no more
 
 
@@ -21,7 +23,9 @@ def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
 
 def line_share(power: Array) -> float:
     """Part of the energy in the three strongest bands, each 6 % to either side."""
-    left, total, found = power.copy(), float(power.sum()), 0.0
+    left = power.copy()
+    total = float(power.sum())
+    found = 0.0
     for _ in range(_BANDS):
         peak = int(np.argmax(left))
         band = slice(int(peak / _WIDE), int(peak * _WIDE) + 2)

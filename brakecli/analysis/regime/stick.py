@@ -66,11 +66,15 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
     if len(velocity.values) < FEWEST_SAMPLES:
         return Slips()
-    found, sign, scale = 0.0, 1.0, velocity.quiet
+    found = 0.0
+    sign = 1.0
+    scale = velocity.quiet
     for m, _ in velocity.scales:
         skewness = _skewness(velocity.thinned(m))
         if abs(skewness) > max(found, _SURE * np.sqrt(6.0 * m / len(velocity.values))):
-            found, sign, scale = abs(skewness), -np.sign(skewness), m
+            found = abs(skewness)
+            sign = -np.sign(skewness)
+            scale = m
     scale = scale if found >= certain else velocity.quiet
     chosen = replace(velocity, values=sign * velocity.values)
     values = chosen.smoothed(scale)
@@ -78,7 +82,8 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     bulk = values[values > 0.0]
     if not len(bulk):
         return Slips(found)
-    middle, noise = float(np.median(bulk)), float(np.sqrt(velocity.noise_at(scale)))
+    middle = float(np.median(bulk))
+    noise = float(np.sqrt(velocity.noise_at(scale)))
     spread = middle + _BULK * DEVIATION * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
     high = max(0.5 * middle, _SURE * noise, spread)
     places = rises(-values, -_AGAIN * middle, high)
@@ -117,7 +122,8 @@ def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.i
 
 def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
     """How far the velocity swings the other way after slips, over them; both beyond what it does between slips."""
-    near, waits = (x[fine:] - x[:-fine]) / fine, np.diff(starts)
+    near = (x[fine:] - x[:-fine]) / fine
+    waits = np.diff(starts)
     wide = int(min(max(_AROUND * scale, 0.125 * len(x) / len(starts)), 0.4 * np.median(waits))) + 1
     long = waits >= np.median(waits)
     between = starts[:-1][long] + waits[long] // 2

@@ -26,7 +26,8 @@ from brakecli.analysis.regime.conditions import (
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Row, Thresholds, first
 from brakecli.analysis.regime.looks import LOOKS
 
-_DAMPED, _FORCED = Regime.DAMPED, (Regime.DAMPED, Excitation.FORCED)
+_DAMPED = Regime.DAMPED
+_FORCED = (Regime.DAMPED, Excitation.FORCED)
 _OWN = Regime.UNDECIDED, Excitation.SELF_EXCITED  # how it looks, `LOOKS` decides
 _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
@@ -372,7 +373,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         longer=True,
     ),
 )
-_WITH_WAVES, _WITHOUT = (*CONTACT, *ROUGH), (*CONTACT, *SMOOTH)
+_WITH_WAVES = (*CONTACT, *ROUGH)
+_WITHOUT = (*CONTACT, *SMOOTH)
 
 
 def decide(answers: Answers, thresholds: Thresholds) -> Decision:

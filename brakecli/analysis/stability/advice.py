@@ -25,17 +25,25 @@ from brakecli.solver.steady_sliding import sliding, tabulated
 
 KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 """What may be advised: masses, stiffnesses, dampings, angles and the load."""
-FACTOR, RUNGS = 10.0, 40  # values may be advised up to this factor away; steps of a ladder each way
+# values may be advised up to this factor away; steps of a ladder each way
+FACTOR = 10.0
+RUNGS = 40
 DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
 _LEAST = 1e-6  # least advice where the value is 0, over what is large for it
 _DECOUPLED = 0.0  # °, where a link does not couple x and y: a shoe may be stable there alone
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
-_STEP, _ROUGH_STEP = 1e-3, 0.1  # of a derivative, as a part of the value; averages over roughness are noisy
+# of a derivative, as a part of the value; averages over roughness are noisy
+_STEP = 1e-3
+_ROUGH_STEP = 0.1
 _ROUNDING = 1e-12  # of an answer
 _FARTHER = 1.2  # times the critical friction: up to there a changed case is searched for its own
-_ROOM, _LEAST_ROOM = 1.01, 0.01  # a search for the critical friction goes on so far beyond what has to be safe
+# a search for the critical friction goes on so far beyond what has to be safe
+_ROOM = 1.01
+_LEAST_ROOM = 0.01
 _NEARBY = 1e-6  # of the way from the value before: a bisection that ends so close to 0° has found 0°
-_FEWEST_DIGITS, _MOST_DIGITS = 4, 16  # of advice; 17 are all that a number has
+# of advice; 17 are all that a number has
+_FEWEST_DIGITS = 4
+_MOST_DIGITS = 16
 _SURE = 0.05  # largest relative error of a derivative; beyond it there is none, as where the answer jumps
 
 Path = tuple[str, ...]
@@ -106,7 +114,9 @@ def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
     """The answer for a case; None where the wheel stands or nothing touches it."""
     with suppress(ArithmeticError, np.linalg.LinAlgError):
         system = system_of(case)
-        c, belt, k = system.coefficients, system.belt_speed, system.contact_stiffness
+        c = system.coefficients
+        belt = system.belt_speed
+        k = system.contact_stiffness
         if rest := sliding(system, tabulated(system)):
             k = rest.stiffness if rest.is_pressed(system.load_at_start) else 0.0
         if belt != 0.0 and k > 0.0:
@@ -150,7 +160,8 @@ def changed(case: Case, path: Path, value: Number) -> Case | None:
 
 def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> Sensitivity:
     """Derivatives by central differences, one-sided at the end of a range, with Richardson's error estimate."""
-    value, parameter = numbers(case)[path], ".".join(path)
+    value = numbers(case)[path]
+    parameter = ".".join(path)
     listed = isinstance(value, tuple)
     at = 1.0 if isinstance(value, tuple) else value
     if path[0] in _IDLE:
@@ -179,7 +190,8 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
     Stability changes at edges only: on smooth pads real roots of its conditions, on rough ones the steps of a
     ladder. So one value between each two edges is asked, and an angle at which a link does not couple x and y.
     """
-    value, parameter = numbers(case)[path], ".".join(path)
+    value = numbers(case)[path]
+    parameter = ".".join(path)
     assert isinstance(value, float)
     low, high = _bounds(case, parameter, value)
     decoupled = (_DECOUPLED,) if _is_angle(parameter) else ()
@@ -210,7 +222,8 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         if not safe(there := way[number].value):
             continue
         before = way[number - 1].value
-        to, until = last(there, before), None
+        to = last(there, before)
+        until = None
         if there in decoupled and abs(to - there) < _NEARBY * abs(before - there):
             to = there
         if value == 0.0 and not decoupled:  # the least value may be as small as one likes
@@ -327,10 +340,13 @@ def _scale(case: Case, parameter: str) -> float:
 def _derivative(f: Callable[[float], float | None], x: float, step: float) -> tuple[float | None, float | None]:
     """The derivative and its relative error; None where there is none."""
     at = f(x)
-    coarse, fine = _difference(f, x, step), _difference(f, x, 0.5 * step)
+    coarse = _difference(f, x, step)
+    fine = _difference(f, x, 0.5 * step)
     if at is None or coarse is None or fine is None:
         return None, None
-    slope, noise = fine + (fine - coarse) / 3.0, _ROUNDING * abs(at) / step  # Richardson: both are of second order
+    # Richardson: both are of second order
+    slope = fine + (fine - coarse) / 3.0
+    noise = _ROUNDING * abs(at) / step
     if abs(slope) <= noise:
         return 0.0, 0.0
     error = (abs(fine - coarse) + noise) / abs(slope)
@@ -339,11 +355,14 @@ def _derivative(f: Callable[[float], float | None], x: float, step: float) -> tu
 
 def _difference(f: Callable[[float], float | None], x: float, step: float) -> float | None:
     """A difference quotient of second order: central, or to the one side that exists."""
-    high, low, at = f(x + step), f(x - step), f(x)
+    high = f(x + step)
+    low = f(x - step)
+    at = f(x)
     if high is not None and low is not None:
         return (high - low) / (2.0 * step)
     for h in (step, -step):
-        half, whole = f(x + 0.5 * h), f(x + h)
+        half = f(x + 0.5 * h)
+        whole = f(x + h)
         if at is not None and half is not None and whole is not None:
             return (4.0 * half - whole - 3.0 * at) / h
     return None

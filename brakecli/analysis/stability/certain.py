@@ -23,7 +23,8 @@ class Rounded:
 
     def __init__(self, value: float, error: float = 0.0) -> None:
         """Hold an exact number, or one with a bound of its error."""
-        self.value, self.error = value, error
+        self.value = value
+        self.error = error
 
     def __add__(self, other: Self) -> "Rounded":
         """Both errors add up."""
@@ -62,8 +63,10 @@ class Links(NamedTuple):
 
 def links_of(case: Case) -> Links:
     """The links of a case; a force that points away from the wheel presses nothing."""
-    one, two = case.link1, case.link2
-    beta, alpha = _inclined(one.angle_deg), _inclined(two.angle_deg)
+    one = case.link1
+    two = case.link2
+    beta = _inclined(one.angle_deg)
+    alpha = _inclined(two.angle_deg)
     b = tensor(Rounded(one.damping), Rounded(two.damping), beta, alpha)
     c = tensor(Rounded(one.stiffness), Rounded(two.stiffness), beta, alpha)
     return Links(Rounded(case.shoe.mass), b, c, c[0] * beta[1] - c[1] * beta[0])
@@ -71,7 +74,8 @@ def links_of(case: Case) -> Links:
 
 def _inclined(degrees: float) -> tuple[Rounded, Rounded]:
     """Sine and cosine of an angle, whose conversion to radians is rounded, too."""
-    (sine, cosine), angle = sin_cos(degrees), abs(math.radians(degrees))
+    sine, cosine = sin_cos(degrees)
+    angle = abs(math.radians(degrees))
     if degrees in (0.0, 90.0, -90.0):
         return Rounded(sine), Rounded(cosine)
     off = EPSILON * angle

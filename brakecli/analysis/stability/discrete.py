@@ -36,13 +36,17 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
     if system.method.own_steps:
         return StepLimits(contraction=0.0, unique=True, growth=1.0)
     scheme = cast(SteppingModule, system.scheme)
-    c, contact_stiffness = system.coefficients, system.contact_stiffness
-    s, problem = system.weights if step is None else system.weights._replace(h=step), new(PROBLEM)
+    c = system.coefficients
+    contact_stiffness = system.contact_stiffness
+    s = system.weights if step is None else system.weights._replace(h=step)
+    problem = new(PROBLEM)
     scheme.prepare(c, s, new(scheme.STATE), problem)
     a_11, a_12, a_22, gain = (float(each) for each in (problem.a_11, problem.a_12, problem.a_22, problem.gain))
     a = a_11 * a_22 - a_12 * a_12
     steepest = contact_stiffness * float(np.abs(system.wheel.g) @ system.wheel.omega)  # bound of |∂F_y/∂x|
-    lift, least = (a_11 + c.phi * abs(a_12)) / a, (a_11 - c.phi * abs(a_12)) / a  # ∂e/∂F on the slip branches
+    # ∂e/∂F on the slip branches
+    lift = (a_11 + c.phi * abs(a_12)) / a
+    least = (a_11 - c.phi * abs(a_12)) / a
     rise = gain * (contact_stiffness * max(0.0, -least) + steepest * (abs(a_12) + c.phi * a_22) / a)
     matrix = amplification(c._replace(phi=0.0), s, scheme, contact_stiffness)
     return StepLimits(
@@ -67,7 +71,8 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     scales = [1.0 / s.h if name in scheme.VELOCITIES else 1.0 for name in scheme.MEMORY]
 
     def step(moved: str | None = None, by: float = 0.0) -> NDArray[np.float64]:
-        state, problem = new(scheme.STATE), new(PROBLEM)
+        state = new(scheme.STATE)
+        problem = new(PROBLEM)
         state.y = state.y_old = -1.0
         state.force = problem.load = contact_stiffness
         problem.belt_now = problem.belt_next = 1e3 / s.h  # a belt so fast that nothing sticks

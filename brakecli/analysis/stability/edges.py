@@ -29,7 +29,9 @@ def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: flo
     the belt speed U ≠ 0, `size` what is large for the key. At a value both friction coefficients, 0 and the
     largest, decide for those between: Hurwitz' condition is concave in φ, the others are linear.
     """
-    x, square, friction = Polynomial([0.0, 1.0]), Polynomial([1.0]), Polynomial([case.friction.coefficient])
+    x = Polynomial([0.0, 1.0])
+    square = Polynomial([1.0])
+    friction = Polynomial([case.friction.coefficient])
     stiff = case.link1.stiffness + case.link2.stiffness + contact_stiffness
     units = {"mass": case.shoe.mass, "stiffness": stiff, "damping": math.sqrt(stiff * case.shoe.mass)}
     numbers: dict[str, Any] = {"shoe.mass": 1.0, "contact": contact_stiffness / stiff}
@@ -48,11 +50,13 @@ def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: flo
     elif key == "friction.coefficient":
         friction = size * x
     elif what == "angle_deg":
-        slopes[link], square = (x, 1.0), 1.0 + x * x
+        slopes[link] = (x, 1.0)
+        square = 1.0 + x * x
         numbers = {name: value if name.startswith(link) else value * square for name, value in numbers.items()}
     else:
         return []
-    m, k = numbers["shoe.mass"], numbers["contact"]
+    m = numbers["shoe.mass"]
+    k = numbers["contact"]
     b, c = (
         tensor(numbers[f"link1.{what}"], numbers[f"link2.{what}"], slopes["link1"], slopes["link2"])
         for what in ("damping", "stiffness")
@@ -78,7 +82,8 @@ def _real_roots(condition: Any) -> list[float]:
     and spoil all others, so that small coefficients of high powers are kept once, and once left out.
     """
     coefficients = np.atleast_1d(getattr(condition, "coef", 0.0))
-    size, found = float(np.abs(coefficients).max()), list[float]()
+    size = float(np.abs(coefficients).max())
+    found = list[float]()
     for least in (0.0, _LEFT * size):
         with suppress(np.linalg.LinAlgError):  # numbers beyond all bounds
             roots = polynomial.polyroots(polynomial.polytrim(coefficients, least))

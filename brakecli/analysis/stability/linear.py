@@ -32,7 +32,9 @@ from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System
 
 _BEYOND = 64.0  # times as long as the run
-_DENSE, _MOST_DENSE = 128, 1024  # blocks of time for each wave at most, and times in each of them
+# blocks of time for each wave at most, and times in each of them
+_DENSE = 128
+_MOST_DENSE = 1024
 _SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
 _PER_PERIOD = 8.0  # times of a block in a period of the fastest wave; the best are then refined
 _NEAR: Array = np.linspace(-1.0, 1.0, 33) / _PER_PERIOD
@@ -66,7 +68,8 @@ class Linear:
     @property
     def sentence(self) -> str:
         """What becomes of the shoe's own vibration, and why."""
-        mode, fate = self.mode, "it neither grows nor decays"
+        mode = self.mode
+        fate = "it neither grows nor decays"
         if self.direction > 0:
             fate = f"still growing at {mode.growth:.3g} 1/s"
         elif self.direction < 0:
@@ -114,12 +117,15 @@ def parts(theories: Sequence[Linear], x: Array, time: Array) -> tuple[Array, Arr
     It is that of longer motions too, as waves beat. Then, at the times given (s), the x that they force and the x
     that each shoe adds (m), in rows.
     """
-    waves, rest = np.array([each.waves[:, 0] for each in theories]), np.array([each.rest[:1] for each in theories])
+    waves = np.array([each.waves[:, 0] for each in theories])
+    rest = np.array([each.rest[:1] for each in theories])
     lasting = _sums(theories[0], time, waves[:, None])[:, 0]
-    high, low = lasting.max(axis=1), lasting.min(axis=1)
+    high = lasting.max(axis=1)
+    low = lasting.min(axis=1)
     if waves.shape[1] > 1 and theories[0].belt:
         beyond = _extremes(theories[0], waves, _BEYOND * time[-1])
-        high, low = np.maximum(high, beyond[0]), np.minimum(low, beyond[1])
+        high = np.maximum(high, beyond[0])
+        low = np.minimum(low, beyond[1])
     return 0.5 * (high - low), lasting, x - rest - lasting
 
 
@@ -146,7 +152,9 @@ def _extremes(theory: Linear, waves: Complex, span: float) -> tuple[Array, Array
     begins, turns, inside, near = _blocks(tuple(theory.passing.tolist()), span)
     begins = waves[:, :, None] * begins
     rows = np.concatenate([begins.imag, begins.real], axis=1).swapaxes(1, 2).astype(np.float32, order="C")
-    peaks, sizes, each = list[Any](), list[Any](), np.arange(rows.shape[1])
+    peaks = list[Any]()
+    sizes = list[Any]()
+    each = np.arange(rows.shape[1])
     for row in rows:  # one at a time, which stays in the cache
         x = (row.reshape(-1, _FEW, row.shape[1]) @ inside).reshape(len(row), -1)
         peaks.append((x.argmax(axis=1), x.argmin(axis=1)))  # in half the time of max and min
@@ -165,7 +173,8 @@ def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Compl
 
     Where so many blocks do not fill the span, they are scattered over it. The third are both parts of the second.
     """
-    speeds, size = 2.0 * math.pi * np.array(frequencies), min(_DENSE * len(frequencies), _MOST_DENSE)
+    speeds = 2.0 * math.pi * np.array(frequencies)
+    size = min(_DENSE * len(frequencies), _MOST_DENSE)
     apart = 1.0 / (_PER_PERIOD * max(map(abs, frequencies)))
     count = min(size, _FEW * math.ceil(span / (apart * size * _FEW)))
     filled = apart * size * count >= span
@@ -255,19 +264,25 @@ def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
     stiffness, load = np.array([(each.contact_stiffness, each.load_at_start) for each in systems]).T
     heights, forces = (np.array(each) for each in zip(*map(_pushes, systems), strict=True))
     wheels = np.array([(each.wheel.omega, each.wheel.phase, each.wheel.turns) for each in systems])
-    (omega, phase, turns), grip = wheels.swapaxes(0, 1), np.copysign(c.phi, belt)
-    offset, passing = -stiffness * heights, -belt[:, None] * turns
-    push, s = np.stack([grip, np.ones_like(grip)], axis=-1), stiffness_matrix(c, stiffness, grip)
+    omega, phase, turns = wheels.swapaxes(0, 1)
+    grip = np.copysign(c.phi, belt)
+    offset = -stiffness * heights
+    passing = -belt[:, None] * turns
+    push = np.stack([grip, np.ones_like(grip)], axis=-1)
+    s = stiffness_matrix(c, stiffness, grip)
     pressed = load[:, None] * np.stack([c.sin_beta, c.cos_beta], axis=-1)
     rest = _solved(s, offset[:, None] * push - pressed)
     speed = (2.0 * math.pi * passing)[:, :, None, None]
-    inertia, damping = c.m[:, None, None, None] * speed * speed * np.eye(2), damping_matrix(c)[:, None]
+    inertia = c.m[:, None, None, None] * speed * speed * np.eye(2)
+    damping = damping_matrix(c)[:, None]
     responses = _solved(s[:, None] - inertia + 1j * speed * damping, push[:, None])
-    force, moves = offset - stiffness * rest[:, 1], first_order(c, s / c.m[:, None, None])
+    force = offset - stiffness * rest[:, 1]
+    moves = first_order(c, s / c.m[:, None, None])
     known = np.isfinite(rest).all(axis=1) & np.isfinite(responses).all(axis=(1, 2)) & (force > 0.0)
     known &= np.isfinite(moves).all(axis=(1, 2))
     phases = forces * np.exp(1j * (omega * rest[:, :1] + phase))
-    waves, slopes = responses * phases[..., None], omega * phases
+    waves = responses * phases[..., None]
+    slopes = omega * phases
     own = _modes(systems, np.where(known[:, None, None], moves, 0.0), grip)
     if turns.size:
         own = _with_slopes(own, push / c.m[:, None], passing, slopes, omega * waves[..., 0])
@@ -298,13 +313,15 @@ def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
 def _modes(systems: Sequence[System], moves: Array, grip: Array) -> _Modes:
     """The modes of ż = A z."""
     found, shapes = np.linalg.eig(moves)
-    values, vectors = found.astype(complex), shapes.astype(complex)
+    values = found.astype(complex)
+    vectors = shapes.astype(complex)
     undamped = np.array([is_undamped(each.coefficients) for each in systems])
     for i in np.flatnonzero(undamped).tolist():  # by square roots, without spurious growth
         each = systems[i]
         values[i], vectors[i, :2] = eigensystem(each.coefficients, each.contact_stiffness, float(grip[i]))
     vectors[:, 2:] = vectors[:, :2] * values[:, None]
-    growth, known_to = values.real.max(axis=1), np.where(undamped, 0.0, _ROUNDING * np.abs(values).max(axis=1))
+    growth = values.real.max(axis=1)
+    known_to = np.where(undamped, 0.0, _ROUNDING * np.abs(values).max(axis=1))
     return _Modes(values, vectors, np.where(np.abs(growth) > known_to, growth, 0.0), known_to)
 
 
@@ -317,7 +334,8 @@ def _with_slopes(own: _Modes, push: Array, passing: Array, slopes: Complex, bend
     1/4 Σ |s|² (G(λ + iΩ) + G(λ - iΩ)) + that mean. What is left is of fourth order; where a sum of a mode and
     a wave comes near another mode, or two modes have met, this says nothing.
     """
-    values, vectors = own.values, own.vectors
+    values = own.values
+    vectors = own.vectors
     turns = 2j * math.pi * np.concatenate([passing, -passing], axis=1)
     sizes = np.abs(np.tile(slopes, 2))[:, None]
     mean = -0.5 * (slopes * bends.conj()).real.sum(axis=1)
@@ -329,7 +347,8 @@ def _with_slopes(own: _Modes, push: Array, passing: Array, slopes: Complex, bend
     rates = (values + moved).real
     known = np.isfinite(rates).all(axis=1) & (strong**2 < _WEAK)
     off = np.abs(moved).max(axis=1) * strong**2 + _ROUNDING_WITH_SLOPES * np.abs(values).max(axis=1)
-    growth, known_to = np.where(known, rates.max(axis=1), own.growth), np.where(known, off, math.inf)
+    growth = np.where(known, rates.max(axis=1), own.growth)
+    known_to = np.where(known, off, math.inf)
     return own._replace(growth=growth, known_to=known_to)
 
 

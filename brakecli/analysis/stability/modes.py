@@ -64,7 +64,8 @@ def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
     """A of ż = A z for x, y, vx, vy, from S/m."""
     a = np.zeros((*s.shape[:-2], 4, 4))
     a[..., 0, 2] = a[..., 1, 3] = 1.0
-    a[..., 2:, :2], a[..., 2:, 2:] = -s, -damping_matrix(c) / np.asarray(c.m)[..., None, None]
+    a[..., 2:, :2] = -s
+    a[..., 2:, 2:] = -damping_matrix(c) / np.asarray(c.m)[..., None, None]
     return a
 
 
@@ -101,7 +102,8 @@ def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple
     """
     s = stiffness_matrix(c, contact_stiffness, grip) / c.m
     if is_undamped(c):
-        trace, determinant = s[0, 0] + s[1, 1], s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
+        trace = s[0, 0] + s[1, 1]
+        determinant = s[0, 0] * s[1, 1] - s[0, 1] * s[1, 0]
         root = np.emath.sqrt((0.5 * (s[0, 0] - s[1, 1])) ** 2 + s[0, 1] * s[1, 0])
         large = 0.5 * trace + root
         squares = np.array([large, determinant / large if large != 0.0 else 0.5 * trace - root], dtype=complex)
@@ -150,9 +152,13 @@ def routh_hurwitz(m: Any, b: Tensor, c: Tensor, k: Any, grip: Any, *, damped: bo
     a1 a2 a3 - a1² a4 - a0 a3² over m, so ordered that nothing cancels but the difference of the
     stiffnesses. Without dashpots nothing decays, and two frequencies must not meet.
     """
-    (b_xx, b_xy, b_yy), (c_xx, c_xy, c_yy) = b, c
-    s_xy, s_yy = c_xy + grip * k, c_yy + k
-    product, both, gap = s_xy * c_xy, s_xy + c_xy, c_xx - s_yy
+    b_xx, b_xy, b_yy = b
+    c_xx, c_xy, c_yy = c
+    s_xy = c_xy + grip * k
+    s_yy = c_yy + k
+    product = s_xy * c_xy
+    both = s_xy + c_xy
+    gap = c_xx - s_yy
     trace = b_xx + b_yy
     if damped:
         quick = (b_xx * b_yy - b_xy**2) * trace * (b_xx * s_yy + b_yy * c_xx - b_xy * both)
@@ -179,7 +185,8 @@ def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Cr
         return []
     pull = math.copysign(contact_stiffness, belt)
     s = stiffness_matrix(c, contact_stiffness, 0.0)
-    a4, a3 = c.m**2, c.m * (c.b_xx + c.b_yy)
+    a4 = c.m**2
+    a3 = c.m * (c.b_xx + c.b_yy)
     a2 = c.m * (s[0, 0] + s[1, 1]) + c.b_xx * c.b_yy - c.b_xy**2
     a1 = np.array([c.b_xx * s[1, 1] + c.b_yy * s[0, 0] - 2.0 * c.b_xy * c.c_xy, -c.b_xy * pull])  # + φ ...
     a0 = np.array([s[0, 0] * s[1, 1] - c.c_xy**2, -c.c_xy * pull])

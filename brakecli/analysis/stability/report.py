@@ -38,7 +38,9 @@ LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness
 FRICTION_STEP = 0.025
 FRICTIONS = 41  # values among which a scheme is asked where it loses stability, by 0.25 where nothing is known
 SURE = 3.0  # standard errors of the mean of the windows that a bar holds; a choice
-NEAREST, WIDER = 1e-9, 4.0  # half a bracket of friction in which a window is asked first, and by which it grows
+# half a bracket of friction in which a window is asked first, and by which it grows
+NEAREST = 1e-9
+WIDER = 4.0
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
 _GROWS = 1e-9  # growth (1/s) over the highest natural frequency (Hz), below which it is rounding
@@ -85,15 +87,19 @@ class StabilityReport:
 
 def stability(system: System) -> StabilityReport:
     """Linear stability of steady sliding at the speed and load of t = 0."""
-    c, belt = system.coefficients, system.belt_speed
-    rest, reason = None, None
+    c = system.coefficients
+    belt = system.belt_speed
+    rest = None
+    reason = None
     try:
         rest = steady_sliding(system)
     except CaseError as error:
         reason = error.problems[0].what
     k = rest.stiffness if rest else system.contact_stiffness
     if rest and not rest.is_pressed(system.load_at_start):
-        rest, reason, k = None, UNPRESSED, 0.0
+        rest = None
+        reason = UNPRESSED
+        k = 0.0
     stiffness_at = mean_stiffness(system, k)
     found = changes(system, stiffness_at)
     critical = next((crossing for crossing in found if crossing.lost), None)
@@ -125,7 +131,8 @@ def stability(system: System) -> StabilityReport:
 
 def changes(system: System, stiffness_at: StiffnessAt, up_to: float = LARGEST_FRICTION) -> list[Crossing]:
     """Every change of stability along φ; on rough surfaces those up to a friction coefficient."""
-    c, belt = system.coefficients, system.belt_speed
+    c = system.coefficients
+    belt = system.belt_speed
     if belt == 0.0 or system.smooth:
         return crossings(c, stiffness_at(c.phi), belt)
     return _rough_crossings(c, belt, stiffness_at, up_to)
@@ -137,7 +144,8 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
     `stiffness` (N/m): that of steady sliding, or of full contact where there is none. Where stability changes
     nowhere, the growth at the system's own friction decides. The wheel turns.
     """
-    c, stiffness_at = system.coefficients, mean_stiffness(system, stiffness)
+    c = system.coefficients
+    stiffness_at = mean_stiffness(system, stiffness)
     if found := changes(system, stiffness_at, up_to):
         return found[0].friction if found[0].lost else 0.0
     k = stiffness_at(c.phi)
@@ -149,7 +157,8 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
 
 def is_stable(system: System) -> bool | None:
     """Whether steady sliding is stable at the system's own friction; None where there is none."""
-    c, belt = system.coefficients, system.belt_speed
+    c = system.coefficients
+    belt = system.belt_speed
     rest = sliding(system)
     pressed = rest and rest.is_pressed(system.load_at_start)
     return _all_decay(c, eigensystem(c, rest.stiffness, c.grip(belt))[0]) if rest and pressed else None
@@ -196,7 +205,9 @@ def _spread(values: list[float]) -> float:
 
 def _critical_error(system: System, critical: Crossing, means: list[Mean]) -> float | None:
     """By which the mean over the waves leaves a critical friction open: where single windows would have it."""
-    c, belt, friction = system.coefficients, system.belt_speed, critical.friction
+    c = system.coefficients
+    belt = system.belt_speed
+    friction = critical.friction
     rests = [sliding(system, mean, friction) for mean in means]
     if belt == 0.0 or c.c_xx == 0.0 or all(rest is not None and rest.contact_fraction == 1.0 for rest in rests):
         return 0.0
@@ -253,7 +264,8 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up
 
 def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None, rate: float) -> Discrete | None:
     """What the scheme makes of steady sliding, which grows at a rate (1/s); None without contact."""
-    phi, h = system.coefficients.phi, system.weights.h
+    phi = system.coefficients.phi
+    h = system.weights.h
     if system.belt_speed == 0.0 or not stiffness_at(phi) > 0.0:
         return None
     if system.method.own_steps:  # the motion itself

@@ -10,7 +10,9 @@ from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
 from brakecli.solver.sine import sine_cosine
 
-CLEAR, PARTLY, FULL = 0, 1, 2
+CLEAR = 0
+PARTLY = 1
+FULL = 2
 
 
 @kernel(int64(float64, PAD_TYPE))
@@ -25,21 +27,36 @@ def coverage(y: float, pad: Any) -> int:
 def full_contact(x: float, y: float, layer: Layer) -> None:
     """The pad touches everywhere: F_y = 2ak [-y - mean f1 + Σ g2 sinc(ω2 a) sin(ω2 (x - travel))]."""
     layer = borrowed(layer)
-    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
-    k, length, n = pad.k, 2.0 * pad.half_length, pad.wheel_terms
-    omega_at, full_at, ss_at, cc_at, pr_at = pad.wheel_at + n, pad.full_at, pad.ss_at, pad.cc_at, pad.pr_at
-    sines, cosines = layer.scratch[:n], layer.scratch[n : 2 * n]
+    pad = layer.pad
+    tables = layer.tables
+    contact = layer.contact
+    angles = layer.angles
+    k = pad.k
+    length = 2.0 * pad.half_length
+    n = pad.wheel_terms
+    omega_at = pad.wheel_at + n
+    full_at = pad.full_at
+    ss_at = pad.ss_at
+    cc_at = pad.cc_at
+    pr_at = pad.pr_at
+    sines = layer.scratch[:n]
+    cosines = layer.scratch[n : 2 * n]
     for i in range(n):
         sines[i], cosines[i] = sine_cosine(tables[omega_at + i] * x + angles[i])
-    mean_force, tangential = -k * length * pad.shoe_mean, 0.0  # k ∫ (f2 - f1) and its derivative by x
+    # k ∫ (f2 - f1) and its derivative by x
+    mean_force = -k * length * pad.shoe_mean
+    tangential = 0.0
     for i in range(n):
         mean_force += tables[full_at + i] * sines[i]
         tangential += tables[full_at + i] * tables[omega_at + i] * cosines[i]
-    square, square_x = pad.shoe_square, 0.0  # ∫ (f2 - f1)² and its derivative by x
+    # ∫ (f2 - f1)² and its derivative by x
+    square = pad.shoe_square
+    square_x = 0.0
     for i in range(n):
         if stopped(pad.signals):
             return
-        ss, cc = -tables[pr_at + i], -tables[pr_at + n + i]
+        ss = -tables[pr_at + i]
+        cc = -tables[pr_at + n + i]
         square += cosines[i] * ss + sines[i] * cc
         for j in range(n):
             ss += tables[ss_at + i * n + j] * cosines[j]
@@ -53,17 +70,25 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     contact.fraction = 1.0
     contact.store = 0.5 * k * (square + length * y * y) - y * mean_force
     contact.store_x = 0.5 * k * square_x - y * tangential
-    contact.kind, contact.valid = CLOSED_FORM, 1
-    contact.near, contact.blur = 0.0 if y + contact.reach <= pad.full_up_to else k * length, 0.0
+    contact.kind = CLOSED_FORM
+    contact.valid = 1
+    contact.near = 0.0 if y + contact.reach <= pad.full_up_to else k * length
+    contact.blur = 0.0
 
 
 @kernel(EVALUATE)
 def full_press(x: float, y: float, layer: Layer) -> None:
     """`full_contact` for a run that takes no derivatives by x: normal force, stiffness 2ak and fraction 1."""
     layer = borrowed(layer)
-    pad, tables, contact, angles = layer.pad, layer.tables, layer.contact, layer.angles
-    length, n, omega_at = 2.0 * pad.half_length, pad.wheel_terms, pad.wheel_at + pad.wheel_terms
-    eights, height = (n + 7) // 8 * 8, -pad.k * length * (pad.shoe_mean + y)
+    pad = layer.pad
+    tables = layer.tables
+    contact = layer.contact
+    angles = layer.angles
+    length = 2.0 * pad.half_length
+    n = pad.wheel_terms
+    omega_at = pad.wheel_at + pad.wheel_terms
+    eights = (n + 7) // 8 * 8
+    height = -pad.k * length * (pad.shoe_mean + y)
     sines = layer.scratch[:eights]
     for i in range(n):
         sines[i] = tables[omega_at + i] * x + angles[i]
@@ -71,8 +96,12 @@ def full_press(x: float, y: float, layer: Layer) -> None:
         sines[i], _ = sine_cosine(sines[i])
     for i in range(n):
         height += tables[pad.full_at + i] * sines[i]
-    contact.normal_force, contact.stiffness, contact.fraction = max(height, 0.0), pad.k * length, 1.0  # Eq. (2)
-    contact.kind, contact.valid = CLOSED_FORM, 1
+    # Eq. (2)
+    contact.normal_force = max(height, 0.0)
+    contact.stiffness = pad.k * length
+    contact.fraction = 1.0
+    contact.kind = CLOSED_FORM
+    contact.valid = 1
 
 
 @kernel(void(CONTACT_TYPE))
@@ -80,8 +109,10 @@ def clear(contact: Any) -> None:
     """The pad touches nowhere: no force, nothing stored."""
     contact.normal_force = contact.stiffness = contact.tangential = contact.fraction = 0.0
     contact.store = contact.store_x = 0.0
-    contact.near, contact.blur = math.inf, 0.0
-    contact.kind, contact.valid = CLOSED_FORM, 1
+    contact.near = math.inf
+    contact.blur = 0.0
+    contact.kind = CLOSED_FORM
+    contact.valid = 1
 
 
 @kernel(EVALUATE)

@@ -26,21 +26,39 @@ from brakecli.solver.sine import sine_cosine
 # `waves` holds, for every harmonic of the gap (the wheel's first, the shoe's with minus): amplitude, wavenumber,
 # phase, and for one interval sine and cosine of the phase in its middle, the half width times omega, and sine and
 # cosine of that. Then come the numbers of the last evaluation, and those of each cell.
-_SINE, _COSINE, _HALF, _SINE_HALF, _COSINE_HALF, _LAST = 3, 4, 5, 6, 7, 8
+_SINE = 3
+_COSINE = 4
+_HALF = 5
+_SINE_HALF = 6
+_COSINE_HALF = 7
+_LAST = 8
 
-_MOVED, _TURNED, _HEIGHT, _START, _FOURTH, _ROUNDING, _CELLS = 0, 1, 2, 3, 4, 5, 6
+_MOVED = 0
+_TURNED = 1
+_HEIGHT = 2
+_START = 3
+_FOURTH = 4
+_ROUNDING = 5
+_CELLS = 6
 """Odometers of the gap (m) and of its slope; y (m); where the interval that touches begins (m), or infinity;
 bounds of the gap's fourth derivative and of the rounding in the gap (m)."""
 
-_FREE, _MONOTONE, _PLACE, _PER_CELL = 0, 1, 2, 3
+_FREE = 0
+_MONOTONE = 1
+_PLACE = 2
+_PER_CELL = 3
 """Readings of the odometers up to which a cell has no root, and up to which the gap is monotone in it; the sign of
 the gap where it has no root, otherwise the root (m)."""
 
-_SURE, _ROUND, _SLACK = 0.999, 1e3, 1e-12
+_SURE = 0.999
+_ROUND = 1e3
+_SLACK = 1e-12
 """What is taken of a bound; after how many heights of the roughness an odometer begins anew, and its rounding by
 then, over that height."""
 _NEAR = 0.5  # rad, below which the sine of a difference is not taken from sines
-_MOST_STEPS, _ROUNDED = 100, 2e-16  # of a search for a root, and the last of them over where it is
+# of a search for a root, and the last of them over where it is
+_MOST_STEPS = 100
+_ROUNDED = 2e-16
 _FOLLOWING = 6  # steps of Halley's iteration, after which the root is searched for
 _WIDER = 4.0  # half widths: the next part of a cell is twice as wide as the last one
 _FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it is exact
@@ -49,13 +67,18 @@ _FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it 
 @kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector), inlined=False)
 def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, float, float]:
     """The gap f2 - f1 - y = Σ g sin(ωξ + ψ) - y at xi, m, and its first three derivatives."""
-    sines, cosines = waves[_SINE * n : (_SINE + 1) * n], waves[_COSINE * n : (_COSINE + 1) * n]
+    sines = waves[_SINE * n : (_SINE + 1) * n]
+    cosines = waves[_COSINE * n : (_COSINE + 1) * n]
     for i in range(n):  # several waves at a time, whereas sums keep their order
         sines[i], cosines[i] = sine_cosine(waves[n + i] * xi + waves[2 * n + i])
-    gap, slope, second, third = -y, 0.0, 0.0, 0.0
+    gap = -y
+    slope = 0.0
+    second = 0.0
+    third = 0.0
     for i in range(n):
         omega = waves[n + i]
-        sine, cosine = waves[i] * sines[i], waves[i] * omega * cosines[i]
+        sine = waves[i] * sines[i]
+        cosine = waves[i] * omega * cosines[i]
         gap += sine
         slope += cosine
         second -= omega * omega * sine
@@ -122,41 +145,65 @@ def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, 
     A wave over the length L about the middle ξ_m has the integral L sinc(ωL/2) g sin(ωξ_m + ψ); products of two
     waves have two such integrals, of the sum and of the difference of their arguments.
     """
-    wheel_terms, n = pad.wheel_terms, pad.wheel_terms + pad.shoe_terms
-    length, middle = right - left, 0.5 * (left + right)
-    at_sine, at_cosine, at_half = _SINE * n, _COSINE * n, _HALF * n
-    sin_half, cos_half = _SINE_HALF * n, _COSINE_HALF * n
-    heights, rise = 0.0, 0.0  # ∫ (f2 - f1), and f2(right) - f2(left) = ∫ f2'
+    wheel_terms = pad.wheel_terms
+    n = pad.wheel_terms + pad.shoe_terms
+    length = right - left
+    middle = 0.5 * (left + right)
+    at_sine = _SINE * n
+    at_cosine = _COSINE * n
+    at_half = _HALF * n
+    sin_half = _SINE_HALF * n
+    cos_half = _COSINE_HALF * n
+    # ∫ (f2 - f1), and f2(right) - f2(left) = ∫ f2'
+    heights = 0.0
+    rise = 0.0
     for i in range(n):
-        g, omega = waves[i], waves[n + i]
+        g = waves[i]
+        omega = waves[n + i]
         half = 0.5 * omega * length
         sine, cosine = sine_cosine(omega * middle + waves[2 * n + i])
         sine_half, cosine_half = sine_cosine(half)
-        waves[at_sine + i], waves[at_cosine + i], waves[at_half + i] = sine, cosine, half
-        waves[sin_half + i], waves[cos_half + i] = sine_half, cosine_half
+        waves[at_sine + i] = sine
+        waves[at_cosine + i] = cosine
+        waves[at_half + i] = half
+        waves[sin_half + i] = sine_half
+        waves[cos_half + i] = cosine_half
         heights += g * length * _sinc_of(sine_half, half) * sine
         if i < wheel_terms:
             rise += 2.0 * g * cosine * sine_half
-    square, work = 0.0, 0.0  # ∫ (f2 - f1)², ∫ (f2 - f1) f2', over half the length
+    # ∫ (f2 - f1)², ∫ (f2 - f1) f2', over half the length
+    square = 0.0
+    work = 0.0
     for i in range(n):
         if stopped(pad.signals):
             return
-        g_i, s_i, c_i, half_i = waves[i], waves[at_sine + i], waves[at_cosine + i], waves[at_half + i]
-        sh_i, ch_i = waves[sin_half + i], waves[cos_half + i]
+        g_i = waves[i]
+        s_i = waves[at_sine + i]
+        c_i = waves[at_cosine + i]
+        half_i = waves[at_half + i]
+        sh_i = waves[sin_half + i]
+        ch_i = waves[cos_half + i]
         omega_i = waves[n + i] if i < wheel_terms else 0.0
         plus = _sinc_of(2.0 * sh_i * ch_i, 2.0 * half_i)
         square += g_i * g_i * (1.0 - plus * (c_i * c_i - s_i * s_i))
         work += g_i * g_i * omega_i * plus * (2.0 * s_i * c_i)
         for j in range(i):
-            s_j, c_j, half_j = waves[at_sine + j], waves[at_cosine + j], waves[at_half + j]
-            one, other = sh_i * waves[cos_half + j], ch_i * waves[sin_half + j]
-            plus, z = _sinc_of(one + other, half_i + half_j), half_i - half_j
+            s_j = waves[at_sine + j]
+            c_j = waves[at_cosine + j]
+            half_j = waves[at_half + j]
+            one = sh_i * waves[cos_half + j]
+            other = ch_i * waves[sin_half + j]
+            plus = _sinc_of(one + other, half_i + half_j)
+            z = half_i - half_j
             minus = _sinc_near_zero(z) if abs(z) < _NEAR else (one - other) / z
-            g, omega_j = g_i * waves[j], waves[n + j] if j < wheel_terms else 0.0
+            g = g_i * waves[j]
+            omega_j = waves[n + j] if j < wheel_terms else 0.0
             square += 2.0 * g * (minus * (c_i * c_j + s_i * s_j) - plus * (c_i * c_j - s_i * s_j))
-            sum_, difference = plus * (s_i * c_j + c_i * s_j), minus * (s_i * c_j - c_i * s_j)
+            sum_ = plus * (s_i * c_j + c_i * s_j)
+            difference = minus * (s_i * c_j - c_i * s_j)
             work += g * (omega_j * (sum_ + difference) + omega_i * (sum_ - difference))
-    square, work = 0.5 * length * square, 0.5 * length * work
+    square = 0.5 * length * square
+    work = 0.5 * length * work
     contact.normal_force += heights - y * length
     contact.stiffness += length
     contact.tangential += rise
@@ -179,14 +226,19 @@ def _turn(touches: bool, place: float, y: float, pad: Any, waves: Floats, contac
 def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Walk over the touching intervals of a cell, and keep what is proved of the cell as a whole."""
     n = pad.wheel_terms + pad.shoe_terms
-    moved, turned, slack = waves[_LAST * n + _MOVED], waves[_LAST * n + _TURNED], _SLACK * pad.crest
-    fourth, rounding = waves[_LAST * n + _FOURTH], waves[_LAST * n + _ROUNDING]
+    moved = waves[_LAST * n + _MOVED]
+    turned = waves[_LAST * n + _TURNED]
+    slack = _SLACK * pad.crest
+    fourth = waves[_LAST * n + _FOURTH]
+    rounding = waves[_LAST * n + _ROUNDING]
     at = _LAST * n + _CELLS + _PER_CELL * cell
     waves[at + _FREE] = waves[at + _MONOTONE] = -1.0
-    begin, width = left, right - left
+    begin = left
+    width = right - left
     while begin < right and not stopped(pad.signals):
         end = min(begin + width, right)
-        whole, half = begin == left and end == right, 0.5 * (end - begin)
+        whole = begin == left and end == right
+        half = 0.5 * (end - begin)
         gap, slope, second, third = _gap(0.5 * (begin + end), y, n, waves)
         # Taylor: by how much the gap and its slope may differ in the cell from what they are in its middle.
         bend = half * (abs(second) + half / 2.0 * (abs(third) + half / 3.0 * fourth))
@@ -209,24 +261,30 @@ def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Float
                 _turn(at_end > 0.0, root, y, pad, waves, contact)
                 if whole:
                     waves[at + _PLACE] = root
-                begin, width = end, _WIDER * half
+                begin = end
+                width = _WIDER * half
                 continue
             free = min(abs(gap), abs(at_end))
         _turn(gap > 0.0, begin, y, pad, waves, contact)
         if whole:
             waves[at + _FREE] = moved + _SURE * (free - rounding) - slack
             waves[at + _PLACE] = 1.0 if gap > 0.0 else -1.0
-        begin, width = end, _WIDER * half
+        begin = end
+        width = _WIDER * half
 
 
 @kernel(void(float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
 def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Pass over the pad and add every interval on which the gap is positive."""
-    n, end, width = pad.wheel_terms + pad.shoe_terms, pad.half_length, 2.0 * pad.half_length / pad.cells
-    moved, turned = waves[_LAST * n + _MOVED], waves[_LAST * n + _TURNED]
+    n = pad.wheel_terms + pad.shoe_terms
+    end = pad.half_length
+    width = 2.0 * pad.half_length / pad.cells
+    moved = waves[_LAST * n + _MOVED]
+    turned = waves[_LAST * n + _TURNED]
     for cell in range(pad.cells):
         at = _LAST * n + _CELLS + _PER_CELL * cell
-        left, right = -end + cell * width, -end + (cell + 1) * width if cell + 1 < pad.cells else end
+        left = -end + cell * width
+        right = -end + (cell + 1) * width if cell + 1 < pad.cells else end
         place = waves[at + _PLACE]
         if moved < waves[at + _FREE]:
             _turn(place > 0.0, left, y, pad, waves, contact)
@@ -239,7 +297,8 @@ def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
             if not math.isnan(root):
                 _turn(slope < 0.0, left, y, pad, waves, contact)
                 _turn(slope > 0.0, root, y, pad, waves, contact)
-                waves[at + _FREE], waves[at + _PLACE] = -1.0, root
+                waves[at + _FREE] = -1.0
+                waves[at + _PLACE] = root
                 continue
         _look(left, right, cell, y, pad, waves, contact)
     _turn(False, end, y, pad, waves, contact)
@@ -248,17 +307,27 @@ def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
 @kernel(void(float64, float64, LAYER, vector), inlined=False)
 def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
     """Put the waves where the shoe is, and let the odometers run."""
-    pad, tables, n = layer.pad, layer.tables, layer.pad.wheel_terms + layer.pad.shoe_terms
-    at, fourth, rounding = _LAST * n, 0.0, abs(y)
-    moved, turned = waves[at + _MOVED] + abs(y - waves[at + _HEIGHT]), waves[at + _TURNED]
+    pad = layer.pad
+    tables = layer.tables
+    n = layer.pad.wheel_terms + layer.pad.shoe_terms
+    at = _LAST * n
+    fourth = 0.0
+    rounding = abs(y)
+    moved = waves[at + _MOVED] + abs(y - waves[at + _HEIGHT])
+    turned = waves[at + _TURNED]
     for i in range(n):
-        g, omega, psi = tables[pad.gap_at + i], tables[pad.gap_at + n + i], tables[pad.gap_at + 2 * n + i]
+        g = tables[pad.gap_at + i]
+        omega = tables[pad.gap_at + n + i]
+        psi = tables[pad.gap_at + 2 * n + i]
         if i < pad.wheel_terms:
             psi = omega * x + layer.angles[i]
             turns = (psi - waves[2 * n + i]) / TWO_PI
             change = TWO_PI * abs(g) * abs(turns - np.floor(turns + 0.5))
-            moved, turned = moved + change, turned + omega * change
-        waves[i], waves[n + i], waves[2 * n + i] = g, omega, psi
+            moved = moved + change
+            turned = turned + omega * change
+        waves[i] = g
+        waves[n + i] = omega
+        waves[2 * n + i] = psi
         fourth += abs(g) * (omega * omega) * (omega * omega)
         rounding += abs(g) * (1.0 + omega * pad.half_length + abs(psi))
     if not moved <= _ROUND * pad.crest:  # or there was nothing before
@@ -266,15 +335,20 @@ def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
         for cell in range(pad.cells):
             place = at + _CELLS + _PER_CELL * cell
             waves[place + _FREE] = waves[place + _MONOTONE] = -1.0
-    waves[at + _MOVED], waves[at + _TURNED], waves[at + _HEIGHT], waves[at + _START] = moved, turned, y, math.inf
-    waves[at + _FOURTH], waves[at + _ROUNDING] = fourth, EPSILON * rounding
+    waves[at + _MOVED] = moved
+    waves[at + _TURNED] = turned
+    waves[at + _HEIGHT] = y
+    waves[at + _START] = math.inf
+    waves[at + _FOURTH] = fourth
+    waves[at + _ROUNDING] = EPSILON * rounding
 
 
 @kernel(EVALUATE)
 def evaluate(x: float, y: float, layer: Layer) -> None:
     """See the package; exact to rounding."""
     layer = borrowed(layer)
-    pad, contact = layer.pad, layer.contact
+    pad = layer.pad
+    contact = layer.contact
     clear(contact)
     contact.kind = EXACT
     covered = coverage(y, pad)

@@ -22,7 +22,12 @@ def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float,
     nodes where the gap f2 - f1 - y is within reach of zero. The rise is that of a polynomial through six
     neighbours, (45 (f_1 - f_-1) - 9 (f_2 - f_-2) + f_3 - f_-3)/60.
     """
-    force, touching, rise, square, work, near = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    force = 0.0
+    touching = 0.0
+    rise = 0.0
+    square = 0.0
+    work = 0.0
+    near = 0.0
     for j in range(f1.size):
         gap = f2[j + 3] - f1[j] - y
         near += 1.0 if abs(gap) <= reach else 0.0
@@ -40,7 +45,8 @@ def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float,
 @kernel(types.UniTuple(float64, 2)(float64, vector, vector), fastmath=FAST)
 def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
     """Sums over the touching nodes, where f2 - f1 - y > 0, of: gap, 1."""
-    force, touching = 0.0, 0.0
+    force = 0.0
+    touching = 0.0
     for j in range(f1.size):
         gap = f2[j + 3] - f1[j] - y
         touch = 1.0 if gap > 0.0 else 0.0
@@ -61,8 +67,16 @@ def _add_parts(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> 
 @kernel(void(vector, vector, vector, vector, vector), fastmath=FAST)
 def _add_five_parts(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
     """`_add_five`, with what is even in ξ and what is odd apart."""
-    s_0, s_1, s_2, s_3, s_4 = s[0], s[1], s[2], s[3], s[4]
-    c_0, c_1, c_2, c_3, c_4 = c[0], c[1], c[2], c[3], c[4]
+    s_0 = s[0]
+    s_1 = s[1]
+    s_2 = s[2]
+    s_3 = s[3]
+    s_4 = s[4]
+    c_0 = c[0]
+    c_1 = c[1]
+    c_2 = c[2]
+    c_3 = c[3]
+    c_4 = c[4]
     for j in range(even.size):
         one = s_0 * table[j + TILE] + s_1 * table[j + 3 * TILE] + s_2 * table[j + 5 * TILE]
         even[j] += one + (s_3 * table[j + 7 * TILE] + s_4 * table[j + 9 * TILE])
@@ -73,9 +87,11 @@ def _add_five_parts(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floa
 @kernel(types.UniTuple(float64, 2)(float64, vector, vector, vector), fastmath=FAST)
 def _pressed_both(y: float, f1: Floats, even: Floats, odd: Floats) -> tuple[float, float]:
     """Sums over the touching nodes of a tile and of those opposite: gap, 1."""
-    force, touching = 0.0, 0.0
+    force = 0.0
+    touching = 0.0
     for j in range(even.size):
-        one, other = even[j] + odd[j] - f1[j] - y, even[j] - odd[j] - f1[j + TILE] - y
+        one = even[j] + odd[j] - f1[j] - y
+        other = even[j] - odd[j] - f1[j + TILE] - y
         touching += (1.0 if one > 0.0 else 0.0) + (1.0 if other > 0.0 else 0.0)
         force += (one if one > 0.0 else 0.0) + (other if other > 0.0 else 0.0)
     return force, touching
@@ -84,24 +100,36 @@ def _pressed_both(y: float, f1: Floats, even: Floats, odd: Floats) -> tuple[floa
 @kernel(types.UniTuple(float64, 2)(float64, float64, LAYER))
 def _press_halves(x: float, y: float, layer: Layer) -> tuple[float, float]:
     """As `_pressed`. What is even in f2 and what is odd give two opposite heights from the tables of one node."""
-    pad, tables, (sines, cosines) = layer.pad, layer.tables, phases(x, layer)
-    n, waves, at = pad.nodes, pad.wheel_terms, pad.waves_at
-    force, touching, left = 0.0, 0.0, (n + 1) // 2 + BESIDE
+    pad = layer.pad
+    tables = layer.tables
+    sines, cosines = phases(x, layer)
+    n = pad.nodes
+    waves = pad.wheel_terms
+    at = pad.waves_at
+    force = 0.0
+    touching = 0.0
+    left = (n + 1) // 2 + BESIDE
     for opposite in range(pad.opposite_at, pad.opposite_at + n + 2 * BESIDE, 2 * TILE):
         if stopped(pad.signals):
             break
-        columns, i = min(TILE, (left + 7) // 8 * 8), 0
-        even, odd, left = layer.scratch[:columns], layer.scratch[TILE : TILE + columns], left - TILE
+        columns = min(TILE, (left + 7) // 8 * 8)
+        i = 0
+        even = layer.scratch[:columns]
+        odd = layer.scratch[TILE : TILE + columns]
+        left = left - TILE
         for j in range(columns):
             even[j] = odd[j] = 0.0
         while i + 5 <= waves:
             _add_five_parts(even, odd, tables[at : at + 10 * TILE], sines[i : i + 5], cosines[i : i + 5])
-            i, at = i + 5, at + 10 * TILE
+            i = i + 5
+            at = at + 10 * TILE
         while i < waves:
             _add_parts(even, odd, tables[at : at + 2 * TILE], sines[i], cosines[i])
-            i, at = i + 1, at + 2 * TILE
+            i = i + 1
+            at = at + 2 * TILE
         more, touch = _pressed_both(y, tables[opposite : opposite + 2 * TILE], even, odd)
-        force, touching = force + more, touching + touch
+        force = force + more
+        touching = touching + touch
     return force, touching
 
 
@@ -115,9 +143,14 @@ def left_out(y: float, layer: Layer) -> float:
     between nodes is that of a parabola with the bend d = g_1 - 2 g_2 + g_3 and the extreme value m: it holds
     4/3 |m| √(2|m/d|) spacings. The mean of its cell is d/24 above the gap in the middle.
     """
-    pad, n, edges, hidden = layer.pad, layer.pad.nodes, 0.0, 0.0
-    f1, f2 = layer.tables[pad.nodes_at : pad.nodes_at + n], layer.scratch[BESIDE : BESIDE + n]
-    before, gap = f2[0] - f1[0] - y, f2[1] - f1[1] - y
+    pad = layer.pad
+    n = layer.pad.nodes
+    edges = 0.0
+    hidden = 0.0
+    f1 = layer.tables[pad.nodes_at : pad.nodes_at + n]
+    f2 = layer.scratch[BESIDE : BESIDE + n]
+    before = f2[0] - f1[0] - y
+    gap = f2[1] - f1[1] - y
     if gap * before < 0.0:
         edges += (gap + before) ** 2 / abs(gap - before)
     for j in range(2, n):
@@ -129,7 +162,8 @@ def left_out(y: float, layer: Layer) -> float:
             extreme = gap - bend / 24.0 - 0.125 * (after - before) ** 2 / bend
             if extreme * gap < 0.0:
                 hidden += abs(extreme) * math.sqrt(2.0 * abs(extreme / bend))
-        before, gap = gap, after
+        before = gap
+        gap = after
     return pad.k * (2.0 * pad.half_length / n) * (0.125 * edges + 4.0 / 3.0 * hidden)  # type: ignore[no-any-return]
 
 
@@ -140,7 +174,8 @@ def press(x: float, y: float, layer: Layer) -> None:
     F_y = k 2a/n Σ gap over the touching nodes, (2), and -∂F_y/∂y = k 2a/n times their number.
     """
     layer = borrowed(layer)
-    pad, contact = layer.pad, layer.contact
+    pad = layer.pad
+    contact = layer.contact
     if layer.window.rows > 0:
         force, touching = _pressed(y, *profiles(x, layer))
     else:
@@ -149,7 +184,8 @@ def press(x: float, y: float, layer: Layer) -> None:
     contact.normal_force = pad.k * spacing * force  # Eq. (2)
     contact.stiffness = pad.k * spacing * touching
     contact.fraction = touching / pad.nodes
-    contact.kind, contact.valid = MIDPOINT, 1
+    contact.kind = MIDPOINT
+    contact.valid = 1
 
 
 @kernel(EVALUATE)
@@ -158,17 +194,22 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     ∂F_y/∂x and ∂V/∂x take the rise of f2 from the neighbouring nodes.
     """
     layer = borrowed(layer)
-    pad, contact, n = layer.pad, layer.contact, layer.pad.nodes
+    pad = layer.pad
+    contact = layer.contact
+    n = layer.pad.nodes
     f1, f2 = profiles(x, layer)
     if stopped(pad.signals):  # the heights are not complete, and their sums would take as long as a step may
         f1 = f1[:0]
     force, touching, rise, square, work, near = _sums(y, contact.reach, f1, f2)
-    k, spacing = pad.k, 2.0 * pad.half_length / n
+    k = pad.k
+    spacing = 2.0 * pad.half_length / n
     contact.normal_force = k * spacing * force  # Eq. (2)
     contact.stiffness = k * spacing * touching
     contact.tangential = k * rise
     contact.fraction = touching / n
     contact.store = 0.5 * k * spacing * square
     contact.store_x = k * work
-    contact.kind, contact.valid = MIDPOINT, 1
-    contact.near, contact.blur = k * spacing * near, contact.stiffness * pad.rise_error
+    contact.kind = MIDPOINT
+    contact.valid = 1
+    contact.near = k * spacing * near
+    contact.blur = contact.stiffness * pad.rise_error

@@ -16,21 +16,26 @@ from brakecli.solver.compile import Floats, address
 from brakecli.solver.records import CONTACT, PAD, WINDOW, Layer, new
 from brakecli.solver.roughness import Surface, height
 
-TILE, BESIDE = 72, 3
+TILE = 72
+BESIDE = 3
 """Nodes of a piece of the tables, and nodes beyond each end of the pad."""
 
 MOST_SUMMED = 10
 """Waves of the wheel up to which their sums at all nodes are as fast as a window."""
 ROWS: tuple[int, ...] = 1, 2, 4, 8, 16
 """Points of the grid of a window to a node."""
-POINTS, INTERPOLATED = 12, 1e-15
+POINTS = 12
+INTERPOLATED = 1e-15
 """Points from which a height in a window is interpolated, and its largest error over the sum of amplitudes,
 which is rounding."""
 
-FEWEST_CELLS, CELLS_PER_WAVE, MOST_CELLS = 8.0, 4.0, 2**16
+FEWEST_CELLS = 8.0
+CELLS_PER_WAVE = 4.0
+MOST_CELLS = 2**16
 """Cells of the pad of which the exact contact keeps what it has found: at least, for each of the shortest waves,
 and at most."""
-BOUND_POINTS, MOST_BOUND_POINTS = 64, 10**6
+BOUND_POINTS = 64
+MOST_BOUND_POINTS = 10**6
 """Points for each of the shortest waves at which the shoe's profile is bounded, and all of them at most."""
 
 NODES_PER_WAVE = 16
@@ -59,17 +64,24 @@ class Pad(NamedTuple):
 def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> Pad:
     """The pad for stiffness k (N/m²), half length (m) and surfaces; `nodes` = 0 without quadrature tables."""
     pad = new(PAD)
-    pad.k, pad.half_length, pad.nodes = k, half_length, nodes
-    pad.shoe_terms, pad.wheel_terms = shoe.g.size, wheel.g.size
+    pad.k = k
+    pad.half_length = half_length
+    pad.nodes = nodes
+    pad.shoe_terms = shoe.g.size
+    pad.wheel_terms = wheel.g.size
     pad.signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
     top, bottom = _shoe_bounds(half_length, *(each.tobytes() for each in shoe))
-    pad.shoe_bound, pad.wheel_bound = max(top, bottom), np.abs(wheel.g).sum()
-    pad.full_up_to, pad.clear_from = -pad.wheel_bound - top, pad.wheel_bound + bottom
+    pad.shoe_bound = max(top, bottom)
+    pad.wheel_bound = np.abs(wheel.g).sum()
+    pad.full_up_to = -pad.wheel_bound - top
+    pad.clear_from = pad.wheel_bound + bottom
     pad.crest = pad.shoe_bound + pad.wheel_bound
     pad.steep, pad.curved = (np.abs(wheel.g) @ wheel.omega**n for n in (1, 2))
     cells = max(FEWEST_CELLS, CELLS_PER_WAVE * 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
-    pad.cell, pad.cells = 2.0 * half_length / cells, min(math.ceil(cells), MOST_CELLS)
-    waves, tiles = wheel.g.size, -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
+    pad.cell = 2.0 * half_length / cells
+    pad.cells = min(math.ceil(cells), MOST_CELLS)
+    waves = wheel.g.size
+    tiles = -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
     pad.edges_at = nodes + 2 * BESIDE + 2 * TILE + 2 * (waves + 7)  # behind what the other evaluators keep
     shapes = {
         "waves_at": (tiles, waves, 2, TILE),  # first, for its tiles must be aligned
@@ -84,9 +96,12 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         "turns_at": (3 * waves,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
-    flat, table, place = aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
+    flat = aligned(sum(map(math.prod, shapes.values())))
+    table = dict[str, Floats]()
+    place = 0
     for name, shape in shapes.items():
-        pad[name], size = place, math.prod(shape)
+        pad[name] = place
+        size = math.prod(shape)
         table[name] = flat[place : place + size].reshape(shape)
         place += size
     table["gap_at"][:] = np.concatenate(
@@ -134,10 +149,14 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = Fa
     """
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    found, window, rows = new(CONTACT), new(WINDOW), int(constants.rows) if moving else 0
+    found = new(CONTACT)
+    window = new(WINDOW)
+    rows = int(constants.rows) if moving else 0
     size = int(constants.edges_at + 8 * waves + 6 + 3 * constants.cells)
     if rows:
-        window.rows, window.shift, window.width = rows, rows.bit_length() - 1, window_width(constants.nodes)
+        window.rows = rows
+        window.shift = rows.bit_length() - 1
+        window.width = window_width(constants.nodes)
         window.spacing = 2.0 * constants.half_length / constants.nodes / rows
         window.at = (size + POINTS + 7) // 8 * 8
         size = int(window.at + rows * window.width)
@@ -234,9 +253,11 @@ def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Float
             minus = np.sinc(np.subtract.outer(f.omega[part], h.omega) * a / np.pi)
             plus = np.sinc(np.add.outer(f.omega[part], h.omega) * a / np.pi)
             g = a * np.outer(f.g[part], h.g)
-            sines[part], cosines[part] = g * (minus - plus), g * (minus + plus)
+            sines[part] = g * (minus - plus)
+            cosines[part] = g * (minus + plus)
 
-    sin_1, cos_1 = np.sin(shoe.phase), np.cos(shoe.phase)
+    sin_1 = np.sin(shoe.phase)
+    cos_1 = np.cos(shoe.phase)
     pair(wheel, wheel, *into)
     pair(wheel, shoe, *(mixed := np.empty((2, wheel.g.size, shoe.g.size))))
     pair(shoe, shoe, *(own := np.empty((2, shoe.g.size, shoe.g.size))))

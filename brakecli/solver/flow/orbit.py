@@ -78,7 +78,8 @@ PURSUIT_TYPE = numba.from_dtype(PURSUIT)
 def note_event(path: Any, o: Any, phase: int) -> None:
     """Note the phase that the last step has ended in."""
     if path.which != NO_EVENT:
-        o.events, o.way = o.events + 1, o.way + _MANY**phase
+        o.events = o.events + 1
+        o.way = o.way + _MANY**phase
 
 
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
@@ -88,11 +89,15 @@ def _returned(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     The rest of the way to the section, -ẋ/ẍ, is followed along the velocity. It vanishes as Newton's iteration
     closes the orbit, which is closed only when it has: M is that of the time flown.
     """
-    m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = o.point[0], o.point[1], 0.0, o.point[2]
+    m.z[X] = o.point[0]
+    m.z[Y] = o.point[1]
+    m.z[V_X] = 0.0
+    m.z[V_Y] = o.point[2]
     if flow(c, m, path, o.period, 1) != DONE or path.velocity[V_X] >= 0.0:
         return 0
     rest = -m.z[V_X] / path.velocity[V_X]
-    o.period, o.late = o.period + rest, rest
+    o.period = o.period + rest
+    o.late = rest
     for row in range(3):
         i = row if row < 2 else V_Y
         o.kept[row] = m.z[i] + rest * path.velocity[i]
@@ -109,13 +114,15 @@ def _add_up(m: Any, path: Any, o: Any, part: float, band: float, falls: int) -> 
     """Add a part of the last step to the numbers of the cycle."""
     for k in range(TERMS):
         power = path.h * part ** (k + 1) / (k + 1)
-        o.mean_x, o.mean_y = o.mean_x + power * m.series[k, X], o.mean_y + power * m.series[k, Y]
+        o.mean_x = o.mean_x + power * m.series[k, X]
+        o.mean_y = o.mean_y + power * m.series[k, Y]
     o.fastest = max(o.fastest, m.z[V_X] / m.z[BELT])
     o.square += 0.5 * part * path.h * (path.begin[V_X] ** 2 + m.z[V_X] ** 2)
     for k in range(2):
         if abs(m.z[V_X]) > _BANDS[k] * band:
             below = 1 if m.z[V_X] < 0.0 else 0
-            o.beaten[k], o.side[k] = o.beaten[k] + (1 if o.side[k] > below else 0), below
+            o.beaten[k] = o.beaten[k] + (1 if o.side[k] > below else 0)
+            o.side[k] = below
     if falls == 1 or path.begin[V_X] < 0.0 <= m.z[V_X]:
         zero_of_velocity(m, path, 1.0 if falls == 1 else -1.0)
         o.low, o.high = min(o.low, m.at[X]), max(o.high, m.at[X])
@@ -127,26 +134,43 @@ def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
 
     Its falls are not counted: of a short rise and fall of ẋ within a step the motion may have seen nothing.
     """
-    m.z[X], m.z[Y], m.z[V_X], m.z[V_Y] = o.point[0], o.point[1], 0.0, o.point[2]
+    m.z[X] = o.point[0]
+    m.z[Y] = o.point[1]
+    m.z[V_X] = 0.0
+    m.z[V_Y] = o.point[2]
     place(c, m, path.h)
     look(m)
-    band, way, passed, last = math.sqrt(o.square / o.period), 0, 0.0, False  # band: of the round before
-    path.word[0], path.events = m.phase, 0
+    # band: of the round before
+    band = math.sqrt(o.square / o.period)
+    way = 0
+    passed = 0.0
+    last = False
+    path.word[0] = m.phase
+    path.events = 0
     for k in range(o.turns):
         way += o.ways[k]
-    o.mean_x, o.mean_y, o.square, o.events, o.way = 0.0, 0.0, 0.0, 0, 0
-    o.low, o.high, o.fastest = o.point[0], o.point[0], 0.0
+    o.mean_x = 0.0
+    o.mean_y = 0.0
+    o.square = 0.0
+    o.events = 0
+    o.way = 0
+    o.low = o.point[0]
+    o.high = o.point[0]
+    o.fastest = 0.0
     for k in range(2):
-        o.beaten[k], o.side[k] = 0, 0
+        o.beaten[k] = 0
+        o.side[k] = 0
     for k in range(PHASES):
         o.spent[k] = 0.0
     for _ in range(MOST_STEPS):
         step(c, m, path, 1)
-        falls, part = 1 if path.begin[V_X] > 0.0 >= m.z[V_X] else 0, path.part
+        falls = 1 if path.begin[V_X] > 0.0 >= m.z[V_X] else 0
+        part = path.part
         last = passed + part * path.h >= o.period * (1.0 - _CLOSED)
         if last:
             part = (o.period - passed) / path.h
-        passed, o.spent[path.old] = passed + part * path.h, o.spent[path.old] + part * path.h
+        passed = passed + part * path.h
+        o.spent[path.old] = o.spent[path.old] + part * path.h
         _add_up(m, path, o, part, band, falls)
         if last:
             break
@@ -154,7 +178,8 @@ def _around(c: Coefficients, m: Any, path: Any, o: Any) -> int:
         if o.events > MOST_EVENTS:
             return 0
         if o.events > path.events:
-            path.times[path.events], path.events = passed, o.events
+            path.times[path.events] = passed
+            path.events = o.events
             path.word[path.events] = m.phase
     o.amplitude = 0.5 * (o.high - o.low)
     return 1 if last and o.way == way else 0
@@ -169,9 +194,15 @@ def sizes(o: Any, x: float, y: float, v_y: float) -> float:
 @kernel(types.UniTuple(float64, 3)(PURSUIT_TYPE, float64, float64, float64), inlined=False)
 def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
     """(I - M)⁻¹ of a vector, by Cramer's rule; far away where there is none."""
-    a, b, c = 1.0 - o.map[0, 0], -o.map[0, 1], -o.map[0, 2]
-    d, e, f = -o.map[1, 0], 1.0 - o.map[1, 1], -o.map[1, 2]
-    g, h, i = -o.map[2, 0], -o.map[2, 1], 1.0 - o.map[2, 2]
+    a = 1.0 - o.map[0, 0]
+    b = -o.map[0, 1]
+    c = -o.map[0, 2]
+    d = -o.map[1, 0]
+    e = 1.0 - o.map[1, 1]
+    f = -o.map[1, 2]
+    g = -o.map[2, 0]
+    h = -o.map[2, 1]
+    i = 1.0 - o.map[2, 2]
     whole = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
     if whole == 0.0:
         return 1e300, 1e300, 1e300
@@ -187,7 +218,9 @@ def closed(c: Coefficients, m: Any, path: Any, o: Any) -> int:
 
     By Newton's method: the point moves by (I - M)⁻¹ (return - point).
     """
-    s, at, k = o.returns, o.point, o.turns
+    s = o.returns
+    at = o.point
+    k = o.turns
     for i in range(3):
         at[i] = s[0, i]
     for _ in range(_ROUNDS):

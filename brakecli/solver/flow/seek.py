@@ -43,7 +43,8 @@ def _bound(m: Any, o: Any, seconds: float) -> None:
     for k in range(3):
         o.bound[k] = 0.0
     for q in range(4):
-        real, imaginary = 0.0, 0.0
+        real = 0.0
+        imaginary = 0.0
         for i in range(4):
             real += o.into[0, q, i] * (m.z[i] - o.rest[i])
             imaginary += o.into[1, q, i] * (m.z[i] - o.rest[i])
@@ -70,15 +71,23 @@ def _returned(m: Any, o: Any, fall: float) -> int:
         s[k, 0], s[k, 1], s[k, 2], o.fell[k] = s[k - 1, 0], s[k - 1, 1], s[k - 1, 2], o.fell[k - 1]
         if k < MOST_TURNS:
             o.lows[k], o.ways[k] = o.lows[k - 1], o.ways[k - 1]
-    s[0, 0], s[0, 1], s[0, 2] = m.at[X], m.at[Y], m.at[V_Y]
+    s[0, 0] = m.at[X]
+    s[0, 1] = m.at[Y]
+    s[0, 2] = m.at[V_Y]
     o.fell[0], o.lows[0], o.ways[0], o.falls = fall, o.low, o.way, o.falls + 1
-    o.low, o.way, o.events = s[0, 0], 0, 0
+    o.low = s[0, 0]
+    o.way = 0
+    o.events = 0
     if o.falls < max(o.next_try, _FIRST):
         return 0
-    low, high = o.lows[0], s[0, 0]
+    low = o.lows[0]
+    high = s[0, 0]
     for k in range(1, min(MOST_TURNS, o.falls - 1) + 1):
-        low, high = min(low, o.lows[k - 1]), max(high, s[k - 1, 0])
-        o.period, o.amplitude, o.turns = fall - o.fell[k], 0.5 * (high - low), k
+        low = min(low, o.lows[k - 1])
+        high = max(high, s[k - 1, 0])
+        o.period = fall - o.fell[k]
+        o.amplitude = 0.5 * (high - low)
+        o.turns = k
         if sizes(o, s[0, 0] - s[k, 0], s[0, 1] - s[k, 1], s[0, 2] - s[k, 2]) < _NEAR:
             return 1
     return 0
@@ -87,13 +96,19 @@ def _returned(m: Any, o: Any, fall: float) -> int:
 @kernel(int64(COEFFICIENTS, FLOW_TYPE, PATH_TYPE, PURSUIT_TYPE), inlined=False)
 def _try(c: Coefficients, m: Any, path: Any, o: Any) -> int:
     """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
-    phase, way, events, low = m.phase, o.way, o.events, o.low
+    phase = m.phase
+    way = o.way
+    events = o.events
+    low = o.low
     for i in range(SIZE):
         o.saved[i] = m.z[i]
     found = closed(c, m, path, o)
     for i in range(SIZE):
         m.z[i] = o.saved[i]
-    m.phase, o.way, o.events, o.low = phase, way, events, low
+    m.phase = phase
+    o.way = way
+    o.events = events
+    o.low = low
     look(m)
     o.next_try = o.falls + _FIRST + (o.falls - o.next_try) // 2
     return found
@@ -113,7 +128,9 @@ def seek(c: Coefficients, m: Any, path: Any, o: Any) -> int:
         if o.time >= o.duration or o.events > MOST_EVENTS:
             return ENDED
         step(c, m, path, 0)
-        o.low, near, falls = min(o.low, m.z[X]), 0, path.begin[V_X] > 0.0 >= m.z[V_X]
+        o.low = min(o.low, m.z[X])
+        near = 0
+        falls = path.begin[V_X] > 0.0 >= m.z[V_X]
         if falls:
             near = _returned(m, o, o.time + zero_of_velocity(m, path, 1.0) * path.h)
         o.time += path.part * path.h
@@ -167,14 +184,25 @@ class Pursuit:
         `rest`: x and y of steady sliding. `modes`: its eigenvalues, and the vectors of position and velocity in
         columns. Raises LinAlgError where two of them are alike.
         """
-        self._coefficients, self._flow, self.path, self.way = c, new(FLOW), new(PATH), new(PURSUIT)
-        flow, o, (values, vectors), inverse = self._flow, self.way, modes, np.linalg.inv(modes[1])
+        self._coefficients = c
+        self._flow = new(FLOW)
+        self.path = new(PATH)
+        self.way = new(PURSUIT)
+        flow = self._flow
+        o = self.way
+        values, vectors = modes
+        inverse = np.linalg.inv(modes[1])
         flow.stiffness, flow.z[BELT], flow.z[LOAD] = acting
         flow.x, flow.y, flow.v_x, flow.v_y = state
-        self.path.h, belt = longest_step(c, acting[0]), acting[1]
-        o.duration, o.sliding = duration, BACKWARD if belt > 0.0 else FORWARD
-        o.rest[:2], o.room[:] = rest, (-rest[1], abs(belt))
-        o.into[0], o.into[1], o.growth[:] = inverse.real, inverse.imag, values.real
+        self.path.h = longest_step(c, acting[0])
+        belt = acting[1]
+        o.duration = duration
+        o.sliding = BACKWARD if belt > 0.0 else FORWARD
+        o.rest[:2] = rest
+        o.room[:] = (-rest[1], abs(belt))
+        o.into[0] = inverse.real
+        o.into[1] = inverse.imag
+        o.growth[:] = values.real
         o.reach[:] = np.abs(vectors[:3]).T
 
     def seek(self) -> int:
@@ -194,10 +222,13 @@ class Pursuit:
     @property
     def orbit(self) -> Orbit:
         """The orbit, once it is found."""
-        o, path = self.way, self.path
-        (x, y, v_y), period = o.point.tolist(), float(o.period)
+        o = self.way
+        path = self.path
+        x, y, v_y = o.point.tolist()
+        period = float(o.period)
         spent = (o.spent / period).tolist()
-        word, times = path.word[: path.events + 1].tolist(), path.times[: path.events].tolist()
+        word = path.word[: path.events + 1].tolist()
+        times = path.times[: path.events].tolist()
         state = x, y, 0.0, v_y
         return Orbit(period, float(o.amplitude), spent[STICK], spent[OPEN], state, tuple(word), tuple(times))
 

@@ -75,7 +75,9 @@ def step(c: Coefficients, m: Any, o: Any, closely: int) -> None:
     """Move to the end of a step, or through the event in it; `closely` follows the series in any case."""
     for i in range(SIZE):
         o.begin[i] = m.z[i]
-    o.old, o.part, o.which = m.phase, 1.0, NO_EVENT
+    o.old = m.phase
+    o.part = 1.0
+    o.which = NO_EVENT
     o.steps += 1
     o.evaluations += 1 if m.phase != OPEN else 0
     if closely == 1 or whole(m, o.h) == 0:
@@ -169,11 +171,14 @@ def _note(m: Any, o: Any, part: float) -> None:
     turns = o.begin[V_X] * m.at[V_X] < 0.0
     if part == 1.0 and o.which == NO_EVENT:
         for k in range(MARGINS if o.old == STICK else MARGINS - 1):
-            fall, rise = o.before[MARGINS + k], m.before[4 + MARGINS + k]
+            fall = o.before[MARGINS + k]
+            rise = m.before[4 + MARGINS + k]
             if fall < 0.0 < rise:
-                begin, end = o.before[k], m.before[4 + k]
+                begin = o.before[k]
+                end = m.before[4 + k]
                 # Its slope begin' + 2 b t + 3 a t² has one zero between, as its ends have different signs.
-                a, b = 2.0 * (begin - end) + fall + rise, 3.0 * (end - begin) - 2.0 * fall - rise
+                a = 2.0 * (begin - end) + fall + rise
+                b = 3.0 * (end - begin) - 2.0 * fall - rise
                 t = -fall / (b + math.sqrt(max(b * b - 3.0 * a * fall, 0.0)))
                 lowest = begin + t * (fall + t * (b + t * a))
                 o.least[o.old, k] = min(o.least[o.old, k], max(lowest, 0.0))
@@ -199,7 +204,9 @@ def flow(c: Coefficients, m: Any, o: Any, span: float, tangents: int) -> int:
         m.at[i] = m.z[i]
     for i in range(4):
         o.start[i] = _rate(m, m.phase, i)
-    o.word[0], o.events, o.time = m.phase, 0, 0.0
+    o.word[0] = m.phase
+    o.events = 0
+    o.time = 0.0
     for _ in range(MOST_STEPS):
         _remember(m, o)
         step(c, m, o, 0)
@@ -213,7 +220,10 @@ def flow(c: Coefficients, m: Any, o: Any, span: float, tangents: int) -> int:
                 o.velocity[i] = _rate(m, o.old, i)
             for i in range(SIZE):
                 m.z[i] = m.at[i]
-            o.which, o.part, m.phase, o.time = NO_EVENT, part, o.old, span
+            o.which = NO_EVENT
+            o.part = part
+            m.phase = o.old
+            o.time = span
             _note(m, o, part)
             return DONE
         if tangents == 1:
@@ -242,9 +252,13 @@ class SmoothFlow:
 
     def __init__(self, c: Coefficients, stiffness: float, belt: float, load: float, step: float) -> None:
         """From the contact's stiffness (N/m), U (m/s), Q (N) and the longest exact step (s)."""
-        self._coefficients, self._motion, self.path = c, new(FLOW), new(PATH)
-        self._motion.stiffness, self.path.h = stiffness, step
-        self._motion.z[BELT], self._motion.z[LOAD] = belt, load
+        self._coefficients = c
+        self._motion = new(FLOW)
+        self.path = new(PATH)
+        self._motion.stiffness = stiffness
+        self.path.h = step
+        self._motion.z[BELT] = belt
+        self._motion.z[LOAD] = load
         self._state = self._motion.z[:4]
 
     @classmethod

@@ -40,7 +40,8 @@ _MOST = 8  # evaluations of the contact in a step
 @kernel(void(LANE_TYPE, SHARED, int64, float64), fastmath=ALIKE)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
     """Sine and cosine of a wave of the wheel at the middle of the pad: of ωx + φ - 2π t times `rate`."""
-    omega, phase = shared.waves[3 * i], shared.waves[3 * i + 1]
+    omega = shared.waves[3 * i]
+    phase = shared.waves[3 * i + 1]
     for n in range(LANES):
         turns = o.rate[i, n] * t
         angle = omega * o.at_x[n] + (phase - TWO_PI * (turns - np.floor(turns)))
@@ -54,22 +55,38 @@ def _add_nodes(o: Any, shared: Shared) -> None:
     The gap at ξ is f2 - f1 - y, where f2 = Σ g (sin cos ωξ + cos sin ωξ) by the sine and cosine of each wave. What
     is even in ξ and what is odd give the gaps at ξ and -ξ from the table of one node.
     """
-    table, gaps, at, pair = shared.table, shared.gaps, 0, 2 * PAIR
+    table = shared.table
+    gaps = shared.gaps
+    at = 0
+    pair = 2 * PAIR
     for n in range(LANES):
         o.found[n] = o.touches[n] = 0.0
     for _ in range(shared.nodes // 2):
-        f1, opposite, s_0, s_1, s_2 = table[at], table[at + 1], table[at + 2], table[at + 3], table[at + 4]
-        s_3, s_4, c_0, c_1, c_2 = table[at + 5], table[at + 6], table[at + 7], table[at + 8], table[at + 9]
-        c_3, c_4 = table[at + 10], table[at + 11]
+        f1 = table[at]
+        opposite = table[at + 1]
+        s_0 = table[at + 2]
+        s_1 = table[at + 3]
+        s_2 = table[at + 4]
+        s_3 = table[at + 5]
+        s_4 = table[at + 6]
+        c_0 = table[at + 7]
+        c_1 = table[at + 8]
+        c_2 = table[at + 9]
+        c_3 = table[at + 10]
+        c_4 = table[at + 11]
         for n in range(LANES):
             odd = o.cosine[0, n] * s_0 + o.cosine[1, n] * s_1 + o.cosine[2, n] * s_2 + o.cosine[3, n] * s_3
             even = o.sine[0, n] * c_0 + o.sine[1, n] * c_1 + o.sine[2, n] * c_2 + o.sine[3, n] * c_3
-            odd, even = odd + o.cosine[4, n] * s_4, even + o.sine[4, n] * c_4 - o.at_y[n]
-            one, other = even + odd - f1, even - odd - opposite
+            odd = odd + o.cosine[4, n] * s_4
+            even = even + o.sine[4, n] * c_4 - o.at_y[n]
+            one = even + odd - f1
+            other = even - odd - opposite
             o.found[n] += (one if one > 0.0 else 0.0) + (other if other > 0.0 else 0.0)
             o.touches[n] += (1.0 if one > 0.0 else 0.0) + (1.0 if other > 0.0 else 0.0)
-            gaps[pair + n], gaps[pair + LANES + n] = one, other
-        at, pair = at + 12, pair + PAIR
+            gaps[pair + n] = one
+            gaps[pair + LANES + n] = other
+        at = at + 12
+        pair = pair + PAIR
 
 
 @kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE, inlined=False)
@@ -79,7 +96,10 @@ def _touch(o: Any, shared: Shared, t: float) -> None:
     F_y = k ∫ max(f2 - f1 - y, 0) dξ; of a pad that touches everywhere it is k (Σ wave sin - length (y + mean f1)).
     """
     shared = borrowed(shared)
-    waves, length, full, clear = shared.waves, shared.length, shared.full_up_to, shared.clear_from
+    waves = shared.waves
+    length = shared.length
+    full = shared.full_up_to
+    clear = shared.clear_from
     for i in range(WAVES):
         _pass(o, shared, i, t)
     partly = 0
@@ -88,8 +108,13 @@ def _touch(o: Any, shared: Shared, t: float) -> None:
         partly |= 1 if o.partly[n] > 0.0 else 0
     if partly:
         _add_nodes(o, shared)
-    g_0, g_1, g_2, g_3, g_4 = waves[2], waves[5], waves[8], waves[11], waves[14]
-    spacing, part = length / shared.nodes, 1.0 / shared.nodes
+    g_0 = waves[2]
+    g_1 = waves[5]
+    g_2 = waves[8]
+    g_3 = waves[11]
+    g_4 = waves[14]
+    spacing = length / shared.nodes
+    part = 1.0 / shared.nodes
     for n in range(LANES):
         mean = g_0 * o.sine[0, n] + g_1 * o.sine[1, n] + g_2 * o.sine[2, n] + g_3 * o.sine[3, n]
         mean += g_4 * o.sine[4, n] - length * (o.at_y[n] + shared.shoe_mean)
@@ -116,18 +141,24 @@ def _begin(o: Any, shared: Shared) -> None:
         _touch(o, shared, late * h)
         part, moves = (h * h / 6.0, 0.0) if late else (0.5 * h * h, h)
         for n in range(LANES):
-            v_x, v_y = o.d[n] + h * o.g_1[n], o.e[n] + h * o.g_2[n]
+            v_x = o.d[n] + h * o.g_1[n]
+            v_y = o.e[n] + h * o.g_2[n]
             a_x, a_y = _acceleration(o, n, o.at_x[n], o.at_y[n], v_x, v_y, o.found[n])
-            a_x, a_y = a_x - o.load[n] * o.sin_beta[n] / o.m[n], a_y - o.load[n] * o.cos_beta[n] / o.m[n]
+            a_x = a_x - o.load[n] * o.sin_beta[n] / o.m[n]
+            a_y = a_y - o.load[n] * o.cos_beta[n] / o.m[n]
             o.at_x[n] += moves * v_x + part * (a_x - o.g_1[n])
             o.at_y[n] += moves * v_y + part * (a_y - o.g_2[n])
-            o.g_1[n], o.g_2[n] = a_x, a_y
+            o.g_1[n] = a_x
+            o.g_2[n] = a_y
             if not late:
                 o.before[n], o.touched[n] = o.found[n], o.touches[n]
-                o.d_old[n], o.e_old[n] = v_x - h * a_x, v_y - h * a_y
+                o.d_old[n] = v_x - h * a_x
+                o.e_old[n] = v_y - h * a_y
                 o.even_x[0, n], o.even_y[0, n], o.even_force[0, n] = o.x_old[n], o.y_old[n], o.found[n]
-                o.even_d[0, n], o.even_d[1, n] = v_x, v_x - 2.0 * h * a_x
-                o.even_e[0, n], o.even_e[1, n] = v_y, v_y - 2.0 * h * a_y
+                o.even_d[0, n] = v_x
+                o.even_d[1, n] = v_x - 2.0 * h * a_x
+                o.even_e[0, n] = v_y
+                o.even_e[1, n] = v_y - 2.0 * h * a_y
     _touch(o, shared, h)
     for n in range(LANES):
         o.x[n], o.y[n], o.force[n], o.touching[n] = o.at_x[n], o.at_y[n], o.found[n], o.touches[n]
@@ -145,10 +176,13 @@ def _prepare(o: Any, shared: Shared) -> None:
     """
     h = shared.h
     for n in range(LANES):
-        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.x_old[n], o.y_old[n]
+        inertia = o.m[n] * (2.0 / (h * h))
+        x_old = o.x_old[n]
+        y_old = o.y_old[n]
         x = THETA_2 * o.x[n] + (THETA_3 + THETA_1) * x_old
         y = THETA_2 * o.y[n] + (THETA_3 + THETA_1) * y_old
-        v_x, v_y = THETA_1 * (2.0 * o.d[n] - o.d_old[n]), THETA_1 * (2.0 * o.e[n] - o.e_old[n])
+        v_x = THETA_1 * (2.0 * o.d[n] - o.d_old[n])
+        v_y = THETA_1 * (2.0 * o.e[n] - o.e_old[n])
         known = THETA_2 * o.force[n] + THETA_3 * o.before[n]
         o.g_1[n] = inertia * (o.x[n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y - o.load[n] * o.sin_beta[n]
         o.g_2[n] = inertia * (o.y[n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x - o.load[n] * o.cos_beta[n]
@@ -171,7 +205,8 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
     h = shared.h
     for _ in range(_MOST):
         for n in range(LANES):
-            f_x, f_y = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n], o.g_2[n] + THETA_1 * o.guess[n]
+            f_x = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n]
+            f_y = o.g_2[n] + THETA_1 * o.guess[n]
             x = o.x_old[n] + 2.0 * h * (o.i_11[n] * f_x + o.i_12[n] * f_y)  # Eq. (15), (16)
             y = o.y_old[n] + 2.0 * h * (o.i_12[n] * f_x + o.i_22[n] * f_y)
             o.at_x[n] = x if o.done[n] == 0.0 else o.at_x[n]
@@ -179,7 +214,8 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
         _touch(o, shared, t)
         left = 0
         for n in range(LANES):
-            waits, change = 1.0 - o.done[n], abs(o.found[n] - o.guess[n])
+            waits = 1.0 - o.done[n]
+            change = abs(o.found[n] - o.guess[n])
             near = o.guess[n] + (o.found[n] - o.guess[n]) / (1.0 + o.answer[n] * o.touches[n])  # Newton's method
             o.guess[n] = near if waits > 0.0 else o.guess[n]
             o.evaluations[n] += waits
@@ -197,9 +233,12 @@ def _finish(o: Any, shared: Shared) -> None:
     """
     h = shared.h
     for n in range(LANES):
-        f_x, f_y = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n], o.g_2[n] + THETA_1 * o.guess[n]
-        d, e = o.i_11[n] * f_x + o.i_12[n] * f_y, o.i_12[n] * f_x + o.i_22[n] * f_y
-        x, y = o.x_old[n] + 2.0 * h * d, o.y_old[n] + 2.0 * h * e
+        f_x = o.g_1[n] + THETA_1 * o.grip[n] * o.guess[n]
+        f_y = o.g_2[n] + THETA_1 * o.guess[n]
+        d = o.i_11[n] * f_x + o.i_12[n] * f_y
+        e = o.i_12[n] * f_x + o.i_22[n] * f_y
+        x = o.x_old[n] + 2.0 * h * d
+        y = o.y_old[n] + 2.0 * h * e
         o.x_old[n], o.y_old[n], o.x[n], o.y[n] = o.x[n], o.y[n], x, y
         o.d_old[n], o.e_old[n], o.d[n], o.e[n] = o.d[n], o.e[n], d, e
         o.force[n], o.touching[n] = o.guess[n], o.touches[n]
@@ -215,22 +254,37 @@ def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> N
     v = w - h²/6 w'', where m w'' are the forces by (6) and (7) of w, 2 (z^{n+1} - z^n - h w)/h² and dF_y/dt.
     """
     h = shared.h
-    part, squared = h * h / 6.0 if number else 0.0, 2.0 / (h * h)
+    part = h * h / 6.0 if number else 0.0
+    squared = 2.0 / (h * h)
     for n in range(LANES):
-        x_old, y_old, v_x, v_y, belt, normal = o.x_old[n], o.y_old[n], o.d[n], o.e[n], o.belt[n], o.before[n]
-        a_x, a_y = squared * (o.x[n] - x_old - h * v_x), squared * (o.y[n] - y_old - h * v_y)
+        x_old = o.x_old[n]
+        y_old = o.y_old[n]
+        v_x = o.d[n]
+        v_y = o.e[n]
+        belt = o.belt[n]
+        normal = o.before[n]
+        a_x = squared * (o.x[n] - x_old - h * v_x)
+        a_y = squared * (o.y[n] - y_old - h * v_y)
         rate = 0.5 / h * (o.force[n] - o.earlier[n])
         j_x, j_y = _acceleration(o, n, v_x, v_y, a_x, a_y, rate)
-        o.v_x[n], o.v_y[n] = v_x - part * j_x, v_y - part * j_y
-        sliding, bound = o.v_x[n] - belt, o.phi[n] * normal
+        o.v_x[n] = v_x - part * j_x
+        o.v_y[n] = v_y - part * j_y
+        sliding = o.v_x[n] - belt
+        bound = o.phi[n] * normal
         needed = o.b_xx[n] * belt + o.b_xy[n] * o.v_y[n] + o.c_xx[n] * x_old + o.c_xy[n] * y_old
         needed += o.load[n] * o.sin_beta[n]  # Eq. (6)
         holds = abs(sliding) <= h * bound / o.m[n] and abs(needed) <= bound
         o.state[n], o.friction[n] = observed(sliding, holds, needed, normal, bound)
     for n in range(LANES):
         row = rows[n, :, number]
-        row[0], row[1], row[2], row[3] = o.x_old[n], o.y_old[n], o.v_x[n], o.v_y[n]
-        row[4], row[5], row[6], row[7] = o.friction[n], o.before[n], o.touched[n], o.state[n]
+        row[0] = o.x_old[n]
+        row[1] = o.y_old[n]
+        row[2] = o.v_x[n]
+        row[3] = o.v_y[n]
+        row[4] = o.friction[n]
+        row[5] = o.before[n]
+        row[6] = o.touched[n]
+        row[7] = o.state[n]
 
 
 @kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], float64[:, ::1]))

@@ -54,10 +54,14 @@ def _miss(o: Any, shared: Shared) -> None:
         o.even_d[2, n], o.even_d[1, n] = o.even_d[1, n], o.even_d[0, n]
         o.even_e[2, n], o.even_e[1, n] = o.even_e[1, n], o.even_e[0, n]
     for n in range(LANES):
-        x, y = o.even_x[1, n], o.even_y[1, n]
-        d, e = 0.5 / h * (o.x[n] - o.even_x[2, n]), 0.5 / h * (o.y[n] - o.even_y[2, n])
-        o.even_d[0, n], o.even_e[0, n] = d, e
-        a_x, a_y = (o.x[n] - 2.0 * x + o.even_x[2, n]) / (h * h), (o.y[n] - 2.0 * y + o.even_y[2, n]) / (h * h)
+        x = o.even_x[1, n]
+        y = o.even_y[1, n]
+        d = 0.5 / h * (o.x[n] - o.even_x[2, n])
+        e = 0.5 / h * (o.y[n] - o.even_y[2, n])
+        o.even_d[0, n] = d
+        o.even_e[0, n] = e
+        a_x = (o.x[n] - 2.0 * x + o.even_x[2, n]) / (h * h)
+        a_y = (o.y[n] - 2.0 * y + o.even_y[2, n]) / (h * h)
         d -= THETA_1 * (d - 2.0 * o.even_d[1, n] + o.even_d[2, n])
         e -= THETA_1 * (e - 2.0 * o.even_e[1, n] + o.even_e[2, n])
         x = THETA_2 * x + THETA_1 * o.x[n] + THETA_3 * o.even_x[2, n]
@@ -77,8 +81,12 @@ def _begin(o: Any, shared: Shared) -> None:
     """
     h = 2.0 * shared.h
     for n in range(LANES):
-        x, y, v_x, v_y = o.even_x[0, n], o.even_y[0, n], o.even_d[0, n], o.even_e[0, n]
-        d, e = 2.0 / h * (o.x[n] - x) - v_x, 2.0 / h * (o.y[n] - y) - v_y
+        x = o.even_x[0, n]
+        y = o.even_y[0, n]
+        v_x = o.even_d[0, n]
+        v_y = o.even_e[0, n]
+        d = 2.0 / h * (o.x[n] - x) - v_x
+        e = 2.0 / h * (o.y[n] - y) - v_y
         f_x = o.grip[n] * (2.0 * o.even_force[0, n] + o.force[n]) - 3.0 * o.load[n] * o.sin_beta[n]
         f_y = 2.0 * o.even_force[0, n] + o.force[n] - 3.0 * o.load[n] * o.cos_beta[n]
         f_x -= o.b_xx[n] * (2.0 * v_x + d) + o.b_xy[n] * (2.0 * v_y + e)
@@ -109,7 +117,9 @@ def _add_hidden(o: Any, gaps: Floats, at: int) -> None:
     the area 4/3 |c| √(2|c/b|).
     """
     for n in range(LANES):
-        before, gap, after = gaps[at + n], gaps[at + PAIR + n], gaps[at + 2 * PAIR + n]
+        before = gaps[at + n]
+        gap = gaps[at + PAIR + n]
+        after = gaps[at + 2 * PAIR + n]
         bend = before - 2.0 * gap + after
         inverse = 1.0 / bend if bend != 0.0 else 0.0
         extreme = gap - bend / 24.0 - 0.125 * (after - before) ** 2 * inverse
@@ -129,18 +139,26 @@ def _leave_out(o: Any, shared: Shared) -> None:
 
     From both ends to the middle, where both halves find an edge: a pair of two such cells takes one division.
     """
-    gaps, at, half, part = shared.gaps, 0, shared.nodes // 2, shared.length / shared.nodes
+    gaps = shared.gaps
+    at = 0
+    half = shared.nodes // 2
+    part = shared.length / shared.nodes
     last = (1 + half) * PAIR
     for n in range(LANES):
         gaps[last + PAIR + n], gaps[last + PAIR + LANES + n] = gaps[last + LANES + n], gaps[last + n]
         o.missing[n] = 0.0
     for pair in range(half + 1):
-        share, hidden = 0.125 if pair < half else 0.0625, 0
+        share = 0.125 if pair < half else 0.0625
+        hidden = 0
         for n in range(LANES):
-            before, gap, after = gaps[at + n], gaps[at + PAIR + n], gaps[at + 2 * PAIR + n]
+            before = gaps[at + n]
+            gap = gaps[at + PAIR + n]
+            after = gaps[at + 2 * PAIR + n]
             one, over = _cut(gap, after)
             hidden |= 1 if _hides(before, gap, after) else 0
-            before, gap, after = gaps[at + LANES + n], gaps[at + PAIR + LANES + n], gaps[at + 2 * PAIR + LANES + n]
+            before = gaps[at + LANES + n]
+            gap = gaps[at + PAIR + LANES + n]
+            after = gaps[at + 2 * PAIR + LANES + n]
             other, under = _cut(gap, after)
             hidden |= 1 if _hides(before, gap, after) else 0
             both = over * under
@@ -165,7 +183,8 @@ def _contact(o: Any, shared: Shared) -> None:
     for n in range(LANES):
         d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])  # by the force of the next level
         e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
-        stiffness, sliding = o.k[n] * shared.length * o.touched[n], o.d[n] - o.belt[n]
+        stiffness = o.k[n] * shared.length * o.touched[n]
+        sliding = o.d[n] - o.belt[n]
         o.tangential[n] = 0.5 / h * (o.force[n] - o.earlier[n]) + stiffness * o.e[n]
         o.stiffness[n] = stiffness * sliding  # both slopes are multiplied by the sliding velocity
         feedback = sliding - 2.0 * h * (o.tangential[n] * d_slope - o.stiffness[n] * e_slope)
@@ -179,34 +198,42 @@ def _move(o: Any, shared: Shared, kind: int) -> None:
     It is the step for (δx, δy) without the load, where δF_y = ∂F_y/∂x δx + ∂F_y/∂y δy is solved for. Sources of
     steps stand beside the forces, and what nodes leave out is a part of δF_y.
     """
-    h, by_steps, by_nodes = shared.h, 1.0 if kind == STEPS else 0.0, 2.0 if kind == NODES else 0.0
+    h = shared.h
+    by_steps = 1.0 if kind == STEPS else 0.0
+    by_nodes = 2.0 if kind == NODES else 0.0
     for n in range(LANES):
-        inertia, x_old, y_old = o.m[n] * (2.0 / (h * h)), o.t_x_old[kind, n], o.t_y_old[kind, n]
+        inertia = o.m[n] * (2.0 / (h * h))
+        x_old = o.t_x_old[kind, n]
+        y_old = o.t_y_old[kind, n]
         x = THETA_2 * o.t_x[kind, n] + (THETA_3 + THETA_1) * x_old
         y = THETA_2 * o.t_y[kind, n] + (THETA_3 + THETA_1) * y_old
-        v_x, v_y = o.t_d[kind, n], o.t_e[kind, n]
-        v_x, v_y = THETA_1 * (2.0 * v_x - o.t_d_old[kind, n]), THETA_1 * (2.0 * v_y - o.t_e_old[kind, n])
+        v_x = o.t_d[kind, n]
+        v_y = o.t_e[kind, n]
+        v_x = THETA_1 * (2.0 * v_x - o.t_d_old[kind, n])
+        v_y = THETA_1 * (2.0 * v_y - o.t_e_old[kind, n])
         known = THETA_2 * o.t_force[kind, n] + THETA_3 * o.t_before[kind, n]
         g_1 = inertia * (o.t_x[kind, n] - x_old) - o.c_xx[n] * x - o.c_xy[n] * y + by_steps * o.source_x[n]
         g_2 = inertia * (o.t_y[kind, n] - y_old) - o.c_yy[n] * y - o.c_xy[n] * x + by_steps * o.source_y[n]
         g_1 += o.grip[n] * known - o.b_xx[n] * v_x - o.b_xy[n] * v_y
         g_2 += known - o.b_xy[n] * v_x - o.b_yy[n] * v_y
-        d, e = o.i_11[n] * g_1 + o.i_12[n] * g_2, o.i_12[n] * g_1 + o.i_22[n] * g_2
+        d = o.i_11[n] * g_1 + o.i_12[n] * g_2
+        e = o.i_12[n] * g_1 + o.i_22[n] * g_2
         d_slope = THETA_1 * (o.i_11[n] * o.grip[n] + o.i_12[n])
         e_slope = THETA_1 * (o.i_12[n] * o.grip[n] + o.i_22[n])
-        x, y = x_old + 2.0 * h * d, y_old + 2.0 * h * e
+        x = x_old + 2.0 * h * d
+        y = y_old + 2.0 * h * e
         own = by_nodes * o.missing[n] * (o.d[n] - o.belt[n])
         force = (o.tangential[n] * x - o.stiffness[n] * y - own) * o.feedback[n]
-        d, e = d + d_slope * force, e + e_slope * force
+        d = d + d_slope * force
+        e = e + e_slope * force
         o.t_x_old[kind, n], o.t_y_old[kind, n] = o.t_x[kind, n], o.t_y[kind, n]
         o.t_d_old[kind, n], o.t_e_old[kind, n] = o.t_d[kind, n], o.t_e[kind, n]
-        o.t_x[kind, n], o.t_y[kind, n], o.t_d[kind, n], o.t_e[kind, n] = (
-            x_old + 2.0 * h * d,
-            y_old + 2.0 * h * e,
-            d,
-            e,
-        )
-        o.t_before[kind, n], o.t_force[kind, n] = o.t_force[kind, n], force
+        o.t_x[kind, n] = x_old + 2.0 * h * d
+        o.t_y[kind, n] = y_old + 2.0 * h * e
+        o.t_d[kind, n] = d
+        o.t_e[kind, n] = e
+        o.t_before[kind, n] = o.t_force[kind, n]
+        o.t_force[kind, n] = force
 
 
 @kernel(float64(float64))
@@ -223,15 +250,22 @@ def _note(o: Any) -> None:
     of the steps.
     """
     for n in range(LANES):
-        x, y = _size(o.t_x[STEPS, n]), _size(o.t_y[STEPS, n])
-        d, e = _size(o.t_d[STEPS, n]), _size(o.t_e[STEPS, n])
+        x = _size(o.t_x[STEPS, n])
+        y = _size(o.t_y[STEPS, n])
+        d = _size(o.t_d[STEPS, n])
+        e = _size(o.t_e[STEPS, n])
         o.worst[0, 0, n], o.worst[0, 1, n] = max(o.worst[0, 0, n], x), max(o.worst[0, 1, n], y)
         o.worst[0, 2, n], o.worst[0, 3, n] = max(o.worst[0, 2, n], d), max(o.worst[0, 3, n], e)
-        x_n, y_n = _size(o.t_x[NODES, n]), _size(o.t_y[NODES, n])
-        d_n, e_n = _size(o.t_d[NODES, n]), _size(o.t_e[NODES, n])
+        x_n = _size(o.t_x[NODES, n])
+        y_n = _size(o.t_y[NODES, n])
+        d_n = _size(o.t_d[NODES, n])
+        e_n = _size(o.t_e[NODES, n])
         o.worst[1, 0, n], o.worst[1, 1, n] = max(o.worst[1, 0, n], x_n), max(o.worst[1, 1, n], y_n)
         o.worst[1, 2, n], o.worst[1, 3, n] = max(o.worst[1, 2, n], d_n), max(o.worst[1, 3, n], e_n)
-        x, y, d, e = x + x_n, y + y_n, d + d_n, e + e_n
+        x = x + x_n
+        y = y + y_n
+        d = d + d_n
+        e = e + e_n
         o.worst[2, 0, n], o.worst[2, 1, n] = max(o.worst[2, 0, n], x), max(o.worst[2, 1, n], y)
         o.worst[2, 2, n], o.worst[2, 3, n] = max(o.worst[2, 2, n], d), max(o.worst[2, 3, n], e)
         change = o.d[n] - o.d_old[n]
@@ -244,7 +278,8 @@ def _note(o: Any) -> None:
 def carry(o: Any, shared: Shared, step: int) -> None:
     """Carry all that is carried along to the older level of the motion, behind a step that has been made."""
     _contact(o, shared)
-    even, own = step % 2 == 0, shared.first == STEPS
+    even = step % 2 == 0
+    own = shared.first == STEPS
     if own and even and step > 0:
         _miss(o, shared)
     if own:  # by kinds that the compiler knows: otherwise it takes one lane at a time
@@ -275,8 +310,10 @@ def renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> N
     if number == 0 or (number < samples and number * PARTS // samples == part):
         return
     for n in range(LANES):
-        x, y = o.t_x_old[DISTURBED, n], o.t_y_old[DISTURBED, n]
-        d, e = o.t_d[DISTURBED, n], o.t_e[DISTURBED, n]
+        x = o.t_x_old[DISTURBED, n]
+        y = o.t_y_old[DISTURBED, n]
+        d = o.t_d[DISTURBED, n]
+        e = o.t_e[DISTURBED, n]
         springs = o.c_xx[n] * x * x + 2.0 * o.c_xy[n] * x * y + (o.c_yy[n] + o.k[n] * shared.length) * y * y
         size = math.sqrt(max(springs, 0.0) / o.m[n] + d * d + e * e)
         sizes[part, n] = size
@@ -286,4 +323,5 @@ def renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> N
             each[DISTURBED, n] = o.t_kept[n] * each[DISTURBED, n] if o.t_kept[n] > 0.0 else 0.0
     for n in range(LANES):
         if o.t_kept[n] == 0.0:
-            o.t_d[DISTURBED, n], o.t_x[DISTURBED, n] = 1.0, shared.h
+            o.t_d[DISTURBED, n] = 1.0
+            o.t_x[DISTURBED, n] = shared.h

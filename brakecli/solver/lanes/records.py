@@ -9,7 +9,8 @@ from brakecli.solver.compile import FAST, Floats, vector
 from brakecli.solver.records import Coefficients, record
 from brakecli.solver.schemes import NUMEROV
 
-LANES, WAVES = 16, 5
+LANES = 16
+WAVES = 5
 """Runs side by side, and waves of the wheel, at most."""
 ALIKE = FAST - {"reassoc"}
 """What lanes allow. With sums in any order the compiler would choose another one for each half of the lanes: a run

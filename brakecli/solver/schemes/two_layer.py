@@ -8,7 +8,9 @@ from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Coefficients, Pair, Weights
 
 STATE = records.STATE
-hold, advance, sample = loop.hold, loop.advance, loop.sample
+hold = loop.hold
+advance = loop.advance
+sample = loop.sample
 LAG = 0
 MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
 VELOCITIES: tuple[str, ...] = ("v_x", "v_y")
@@ -34,20 +36,34 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
 @kernel(records.PREPARE)
 def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
     """(25), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
-    h, theta_1, theta_2, inertia, load = s.h, s.theta_1, s.theta_2, c.m / s.h, problem.load
-    x, y, p, q = state.x, state.y, state.v_x, state.v_y
+    h = s.h
+    theta_1 = s.theta_1
+    theta_2 = s.theta_2
+    inertia = c.m / s.h
+    load = problem.load
+    x = state.x
+    y = state.y
+    p = state.v_x
+    q = state.v_y
     problem.a_11 = inertia + theta_1 * (c.b_xx + theta_2 * c.c_xx * h)  # Eq. (25)
     problem.a_12 = theta_1 * (c.b_xy + theta_2 * c.c_xy * h)  # Eq. (25)
     problem.a_22 = inertia + theta_1 * (c.b_yy + theta_2 * c.c_yy * h)  # Eq. (25)
-    b, k = 1.0 - theta_1, theta_1 * (1.0 - theta_2) * h
-    xx, xy, yy = b * c.b_xx + k * c.c_xx, b * c.b_xy + k * c.c_xy, b * c.b_yy + k * c.c_yy
+    b = 1.0 - theta_1
+    k = theta_1 * (1.0 - theta_2) * h
+    xx = b * c.b_xx + k * c.c_xx
+    xy = b * c.b_xy + k * c.c_xy
+    yy = b * c.b_yy + k * c.c_yy
     problem.g_1 = inertia * p - xx * p - xy * q - c.c_xx * x - c.c_xy * y - load * c.sin_beta  # Eq. (25)
     problem.g_2 = inertia * q - yy * q - xy * p - c.c_yy * y - c.c_xy * x - load * c.cos_beta  # Eq. (25)
-    problem.x_0, problem.y_0 = x + k * p, y + k * q  # arguments of F_y in (23), less gain p and gain q
+    # arguments of F_y in (23), less gain p and gain q
+    problem.x_0 = x + k * p
+    problem.y_0 = y + k * q
     problem.gain = theta_1 * theta_2 * h
     problem.belt = problem.belt_next
     problem.phi = c.phi
-    problem.d, problem.e, problem.normal_force = p, q, state.force
+    problem.d = p
+    problem.e = q
+    problem.normal_force = state.force
 
 
 @kernel(records.FINISH)
@@ -57,13 +73,20 @@ def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, 
     m (p' - p)/h dx = change of kinetic energy + m (theta_2 - 1/2)|p' - p|², and the links likewise with
     theta_1 - 1/2: what a scheme with other weights than one half takes out of the motion by itself.
     """
-    h, p, q = s.h, state.v_x, state.v_y
-    p_new, q_new = problem.d, problem.e
+    h = s.h
+    p = state.v_x
+    q = state.v_y
+    p_new = problem.d
+    q_new = problem.e
     friction = problem.a_11 * p_new + problem.a_12 * q_new - problem.g_1
-    v_x, v_y = s.theta_2 * p_new + (1.0 - s.theta_2) * p, s.theta_2 * q_new + (1.0 - s.theta_2) * q
-    u_x, u_y = s.theta_1 * p_new + (1.0 - s.theta_1) * p, s.theta_1 * q_new + (1.0 - s.theta_1) * q
+    v_x = s.theta_2 * p_new + (1.0 - s.theta_2) * p
+    v_y = s.theta_2 * q_new + (1.0 - s.theta_2) * q
+    u_x = s.theta_1 * p_new + (1.0 - s.theta_1) * p
+    u_y = s.theta_1 * q_new + (1.0 - s.theta_1) * q
     belt = s.theta_2 * problem.belt_next + (1.0 - s.theta_2) * problem.belt_now
-    dx, dy, slid = h * v_x, h * v_y, h * (v_x - belt)
+    dx = h * v_x
+    dy = h * v_y
+    slid = h * (v_x - belt)
     work.belt += h * friction * belt
     work.friction -= friction * slid
     work.dashpots += dx * (c.b_xx * u_x + c.b_xy * u_y) + dy * (c.b_xy * u_x + c.b_yy * u_y)
@@ -73,8 +96,12 @@ def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, 
     links = c.c_xx * dx * dx + 2.0 * c.c_xy * dx * dy + c.c_yy * dy * dy
     layer = slid * (contact.store_x - work.store_x_before) - dy * (contact.normal_force - work.force_before)
     work.scheme += (s.theta_2 - 0.5) * inertia + (s.theta_1 - 0.5) * (links + layer)
-    work.store_x_before, work.force_before = contact.store_x, contact.normal_force
-    state.x_old, state.y_old = state.x, state.y
+    work.store_x_before = contact.store_x
+    work.force_before = contact.normal_force
+    state.x_old = state.x
+    state.y_old = state.y
     state.x += dx  # Eq. (21)
     state.y += dy  # Eq. (22)
-    state.v_x, state.v_y, state.force = p_new, q_new, problem.normal_force
+    state.v_x = p_new
+    state.v_y = q_new
+    state.force = problem.normal_force

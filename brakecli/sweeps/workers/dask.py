@@ -32,7 +32,9 @@ class ClusterEngine(Engine):
 
         It is given by its address, or by a client or a cluster of dask; these stay as they are.
         """
-        self.compute, self._versions, self._shared = compute, fingerprint(), None
+        self.compute = compute
+        self._versions = fingerprint()
+        self._shared = None
         address = str(getattr(getattr(scheduler, "scheduler", None), "address", scheduler))
         given, name = ("scheduler", address) if scheduler_file is None else ("scheduler-file", scheduler_file)
         self._where = f"{argument(given)} {name}"
@@ -124,7 +126,8 @@ class ClusterEngine(Engine):
     def _gone(self) -> Iterator[Finished]:
         """The workers that are no longer there."""
         now = self._addresses()
-        gone, self._known = sorted(self._known - now), now
+        gone = sorted(self._known - now)
+        self._known = now
         for address in gone:
             yield Finished(None, failure=f"the worker at {address} has gone")
 

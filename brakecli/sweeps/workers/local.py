@@ -62,7 +62,9 @@ class LocalEngine(Engine):
 
     def __init__(self, compute: Compute, workers: int, *, spare: bool = False) -> None:
         """Prepare as many workers. Each is started with its first task."""
-        self.compute, self.workers, self.spare = compute, workers, spare
+        self.compute = compute
+        self.workers = workers
+        self.spare = spare
         self.pool: list[Worker] = []
         self._ending = ExitStack()
         self._lost: int | None = 0  # workers that ended before any has answered; None once one has
@@ -137,7 +139,8 @@ class LocalEngine(Engine):
         worker.pipe.close()
 
     def _collect(self, worker: Worker) -> Finished:
-        task, worker.task = worker.task, None
+        task = worker.task
+        worker.task = None
         try:
             finished: Finished = worker.pipe.recv()
         except (EOFError, OSError):
@@ -166,7 +169,8 @@ def _cause_of_death(code: int) -> str:
 def _starting() -> Iterator[None]:
     """Let a child start on one thread and without signals: one would end Python's start in a traceback."""
     with signals_deferred():
-        mask, ours = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS), dict(os.environ)
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+        ours = dict(os.environ)
         os.environ.update(ONE_THREAD)
         try:
             yield

@@ -42,7 +42,8 @@ from brakecli.solver.records import Parts, new
 from brakecli.solver.roughness import Surface, wheel_angles
 from brakecli.solver.system import System
 
-CELLS_PER_WAVE, LEAST_CELLS = 24, 96
+CELLS_PER_WAVE = 24
+LEAST_CELLS = 96
 STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passes
 
 
@@ -113,10 +114,14 @@ class RoughFlow:
         cell = 2.0 * system.half_length / cells
         if not cell * system.most_turns < 0.5:
             raise ValueError(f"{cells} cells are too few: two and more to each wave are needed")
-        self.system, self.cells = system, cells
+        self.system = system
+        self.cells = cells
         self._flow, self._tables = _prepared(system, cells)
-        n, at = system.wheel.g.size, int(self._flow["angles_at"])
-        self._belt, self._waves, self._angles = system.belt_speed, system.wheel.waves, self._tables[at : at + n]
+        n = system.wheel.g.size
+        at = int(self._flow["angles_at"])
+        self._belt = system.belt_speed
+        self._waves = system.wheel.waves
+        self._angles = self._tables[at : at + n]
         self._memory = np.zeros(LARGEST, np.int8)
         self._address = self._memory.ctypes.data
         hold(Parts(system.coefficients, self._flow, self._tables), self._address)
@@ -126,7 +131,8 @@ class RoughFlow:
         f = self._flow
         travel, travel_low = two_product(self._belt, begin_time)
         wheel_angles(self._waves, travel, travel_low, self._angles)
-        f["z"], f["tangents"] = state, int(tangents)
+        f["z"] = state
+        f["tangents"] = int(tangents)
         status = Status(fly(self._address, span / steps, steps))
         events = int(f["events"])
         return Flown(
@@ -155,9 +161,15 @@ def _flattened(surface: Surface, cell: float) -> Floats:
 
 def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
     """The record of a flow, and its tables."""
-    f, wheel, shoe, a = new(ROUGH), system.wheel, system.shoe, system.half_length
-    half, waves, cell = cells // 2, wheel.g.size, 2.0 * a / cells
-    width, eights = -(-(half + 1) // FOUR) * FOUR, -(-waves // EIGHT) * EIGHT
+    f = new(ROUGH)
+    wheel = system.wheel
+    shoe = system.shoe
+    a = system.half_length
+    half = cells // 2
+    waves = wheel.g.size
+    cell = 2.0 * a / cells
+    width = -(-(half + 1) // FOUR) * FOUR
+    eights = -(-waves // EIGHT) * EIGHT
     shapes = {
         "waves_at": (waves, 2, width),  # first, for its rows must be aligned
         "nodes_at": (4, width),
@@ -168,26 +180,41 @@ def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
         "full_at": (waves,),
         "angles_at": (waves,),
     }
-    tables, table, place = aligned(sum(map(math.prod, shapes.values()))), dict[str, Floats](), 0
+    tables = aligned(sum(map(math.prod, shapes.values())))
+    table = dict[str, Floats]()
+    place = 0
     for name, shape in shapes.items():
-        f[name], size = place, math.prod(shape)
+        f[name] = place
+        size = math.prod(shape)
         table[name] = tables[place : place + size].reshape(shape)
         place += size
-    xi, g, heights = cell * np.arange(width), _flattened(wheel, cell), table["shoe_at"]
+    xi = cell * np.arange(width)
+    g = _flattened(wheel, cell)
+    heights = table["shoe_at"]
     for amplitude, omega, phase in zip(_flattened(shoe, cell), shoe.omega, shoe.phase, strict=True):
         heights += amplitude * np.sin(omega * np.array([xi, -xi]) + phase)
-    table["omega_at"][:], table["g_at"][:] = wheel.omega, g
+    table["omega_at"][:] = wheel.omega
+    table["g_at"][:] = g
     angle = np.outer(wheel.omega, xi)
-    table["waves_at"][:, 0], table["waves_at"][:, 1] = np.sin(angle), np.cos(angle)
+    table["waves_at"][:, 0] = np.sin(angle)
+    table["waves_at"][:, 1] = np.cos(angle)
     steeper = np.divide(wheel.g, g, out=np.ones_like(g), where=g != 0.0)
     table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * steeper
-    f["belt"], f["stiffness"] = system.belt_speed, system.contact_stiffness
-    load, c = system.load_at_start, system.coefficients
-    f["pull_x"], f["pull_y"] = load * c.sin_beta, load * c.cos_beta
-    f["half"], f["cells"], f["half_cells"] = 0.5 * system.layer_stiffness * cell, cells, half
-    f["width"], f["waves"] = width, waves
+    f["belt"] = system.belt_speed
+    f["stiffness"] = system.contact_stiffness
+    load = system.load_at_start
+    c = system.coefficients
+    f["pull_x"] = load * c.sin_beta
+    f["pull_y"] = load * c.cos_beta
+    f["half"] = 0.5 * system.layer_stiffness * cell
+    f["cells"] = cells
+    f["half_cells"] = half
+    f["width"] = width
+    f["waves"] = waves
     f["shoe_mean"] = float(np.sum(shoe.g * np.sin(shoe.phase) * np.sinc(shoe.omega * a / np.pi)))
-    crest, nodes = float(np.abs(g).sum()), heights[:, : half + 1]
-    f["full_up_to"], f["clear_from"] = -crest - nodes.max(), crest - nodes.min()
+    crest = float(np.abs(g).sum())
+    nodes = heights[:, : half + 1]
+    f["full_up_to"] = -crest - nodes.max()
+    f["clear_from"] = crest - nodes.min()
     f["signals"] = np.frombuffer(stop.memory, np.uint8).ctypes.data
     return f, tables

@@ -16,8 +16,14 @@ _TINY = 1e-300  # avoids a division by zero where a cell is open
 def _add_four(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
     """Add four waves s cos(ωξ) + c sin(ωξ) to the even part and to the odd part of a height."""
     n = even.size
-    s_0, s_1, s_2, s_3 = s[0], s[1], s[2], s[3]
-    c_0, c_1, c_2, c_3 = c[0], c[1], c[2], c[3]
+    s_0 = s[0]
+    s_1 = s[1]
+    s_2 = s[2]
+    s_3 = s[3]
+    c_0 = c[0]
+    c_1 = c[1]
+    c_2 = c[2]
+    c_3 = c[3]
     for j in range(n):
         odd[j] += (c_0 * table[j] + c_1 * table[j + 2 * n]) + (c_2 * table[j + 4 * n] + c_3 * table[j + 6 * n])
         one = s_0 * table[j + n] + s_1 * table[j + 3 * n]
@@ -36,12 +42,15 @@ def _add_one(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> No
 @kernel(void(ROUGH_TYPE, vector, vector, vector, int64), inlined=False)
 def _sum_waves(f: Any, tables: Floats, even: Floats, odd: Floats, at: int) -> None:
     """The even part and the odd part of a sum of waves, whose factors begin `at` a place of the tables."""
-    n, i, eights = f.width, 0, (f.waves + EIGHT - 1) // EIGHT * EIGHT
+    n = f.width
+    i = 0
+    eights = (f.waves + EIGHT - 1) // EIGHT * EIGHT
     for j in range(n):
         even[j] = odd[j] = 0.0
     while i + 4 <= f.waves:
         begin = f.waves_at + 2 * n * i
-        s, c = tables[at + i : at + i + 4], tables[at + eights + i : at + eights + i + 4]
+        s = tables[at + i : at + i + 4]
+        c = tables[at + eights + i : at + eights + i + 4]
         _add_four(even, odd, tables[begin : begin + 8 * n], s, c)
         i += 4
     while i < f.waves:
@@ -58,7 +67,8 @@ def _cell(one: float, two: float) -> tuple[float, float]:
     negative, and both are 0 otherwise.
     """
     high, low = (one, two) if one > two else (two, one)
-    press, rest = (high if high > 0.0 else 0.0), (low if low > 0.0 else 0.0)
+    press = high if high > 0.0 else 0.0
+    rest = low if low > 0.0 else 0.0
     return np.divide(press, press - (low - rest) + _TINY), press + rest
 
 
@@ -68,14 +78,19 @@ def _pressed(y: float, even: Floats, odd: Floats, right: Floats, left: Floats, c
 
     c is the length of a cell; `right` and `left` are f1.
     """
-    force, touching = 0.0, 0.0
+    force = 0.0
+    touching = 0.0
     for j in range(cells):
-        one, two = even[j] + odd[j] - right[j] - y, even[j + 1] + odd[j + 1] - right[j + 1] - y
+        one = even[j] + odd[j] - right[j] - y
+        two = even[j + 1] + odd[j + 1] - right[j + 1] - y
         part, gap = _cell(one, two)
-        force, touching = force + part * gap, touching + 2.0 * part
-        one, two = even[j] - odd[j] - left[j] - y, even[j + 1] - odd[j + 1] - left[j + 1] - y
+        force = force + part * gap
+        touching = touching + 2.0 * part
+        one = even[j] - odd[j] - left[j] - y
+        two = even[j + 1] - odd[j + 1] - left[j + 1] - y
         part, gap = _cell(one, two)
-        force, touching = force + part * gap, touching + 2.0 * part
+        force = force + part * gap
+        touching = touching + 2.0 * part
     return force, touching
 
 
@@ -91,15 +106,21 @@ def _pressed_steeply(
     y: float, even: Floats, odd: Floats, rise: Floats, turn: Floats, right: Floats, left: Floats, cells: int
 ) -> tuple[float, float, float]:
     """As `_pressed`, and the derivative of its first number by x; the slope of f2 has the parts `rise`, `turn`."""
-    force, touching, slope = 0.0, 0.0, 0.0
+    force = 0.0
+    touching = 0.0
+    slope = 0.0
     for j in range(cells):
-        one, two = even[j] + odd[j] - right[j] - y, even[j + 1] + odd[j + 1] - right[j + 1] - y
+        one = even[j] + odd[j] - right[j] - y
+        two = even[j + 1] + odd[j + 1] - right[j + 1] - y
         part, gap = _cell(one, two)
-        force, touching = force + part * gap, touching + 2.0 * part
+        force = force + part * gap
+        touching = touching + 2.0 * part
         slope += _slope(part, one, two, rise[j] + turn[j], rise[j + 1] + turn[j + 1])
-        one, two = even[j] - odd[j] - left[j] - y, even[j + 1] - odd[j + 1] - left[j + 1] - y
+        one = even[j] - odd[j] - left[j] - y
+        two = even[j + 1] - odd[j + 1] - left[j + 1] - y
         part, gap = _cell(one, two)
-        force, touching = force + part * gap, touching + 2.0 * part
+        force = force + part * gap
+        touching = touching + 2.0 * part
         slope += _slope(part, one, two, rise[j] - turn[j], rise[j + 1] - turn[j + 1])
     return force, touching, slope
 
@@ -107,19 +128,26 @@ def _pressed_steeply(
 @kernel(void(ROUGH_TYPE, vector, float64), inlined=False)
 def _turn(f: Any, tables: Floats, place: float) -> None:
     """g sin ψ, g cos ψ and their slopes by x of each wave: ψ = ω `place` + ψ_0 where x - U since is `place`."""
-    n, eights = f.waves, (f.waves + EIGHT - 1) // EIGHT * EIGHT
+    n = f.waves
+    eights = (f.waves + EIGHT - 1) // EIGHT * EIGHT
     at = f.sines_at
-    sines, cosines = tables[at : at + eights], tables[at + eights : at + 2 * eights]
-    rises, turns = tables[at + 2 * eights : at + 3 * eights], tables[at + 3 * eights : at + 4 * eights]
+    sines = tables[at : at + eights]
+    cosines = tables[at + eights : at + 2 * eights]
+    rises = tables[at + 2 * eights : at + 3 * eights]
+    turns = tables[at + 3 * eights : at + 4 * eights]
     for i in range(n):
         sines[i] = tables[f.omega_at + i] * place + tables[f.angles_at + i]
     for i in range(eights):
         sines[i], cosines[i] = sine_cosine(sines[i])
     for i in range(n):
-        g, omega = tables[f.g_at + i], tables[f.omega_at + i]
-        sines[i], cosines[i] = g * sines[i], g * cosines[i]
-        rises[i], turns[i] = omega * cosines[i], -omega * sines[i]
-    f.place, f.known = place, 1
+        g = tables[f.g_at + i]
+        omega = tables[f.omega_at + i]
+        sines[i] = g * sines[i]
+        cosines[i] = g * cosines[i]
+        rises[i] = omega * cosines[i]
+        turns[i] = -omega * sines[i]
+    f.place = place
+    f.known = 1
 
 
 @kernel(void(ROUGH_TYPE, vector, float64, float64, int64), inlined=False)
@@ -138,25 +166,33 @@ def press(f: Any, tables: Floats, place: float, y: float, steeply: int) -> None:
     if f.known == 0:
         _turn(f, tables, place)
     if y <= f.full_up_to:
-        force, slope = -(y + f.shoe_mean) * f.stiffness, 0.0
+        force = -(y + f.shoe_mean) * f.stiffness
+        slope = 0.0
         for i in range(f.waves):
             force += tables[f.full_at + i] * tables[f.sines_at + i]
             slope += tables[f.full_at + i] * tables[f.sines_at + 2 * eights + i]
-        f.force, f.slope, f.touching = force, slope, f.stiffness
+        f.force = force
+        f.slope = slope
+        f.touching = f.stiffness
         return
-    n, at = f.width, f.nodes_at
-    even, odd = tables[at : at + n], tables[at + n : at + 2 * n]
-    right, left = tables[f.shoe_at : f.shoe_at + n], tables[f.shoe_at + n : f.shoe_at + 2 * n]
+    n = f.width
+    at = f.nodes_at
+    even = tables[at : at + n]
+    odd = tables[at + n : at + 2 * n]
+    right = tables[f.shoe_at : f.shoe_at + n]
+    left = tables[f.shoe_at + n : f.shoe_at + 2 * n]
     if f.known < 2:
         _sum_waves(f, tables, even, odd, f.sines_at)
         f.known = 2
     if steeply == 0:
         force, touching = _pressed(y, even, odd, right, left, f.half_cells)
     else:
-        rise, turn = tables[at + 2 * n : at + 3 * n], tables[at + 3 * n : at + 4 * n]
+        rise = tables[at + 2 * n : at + 3 * n]
+        turn = tables[at + 3 * n : at + 4 * n]
         if f.known < 3:
             _sum_waves(f, tables, rise, turn, f.sines_at + 2 * eights)
             f.known = 3
         force, touching, slope = _pressed_steeply(y, even, odd, rise, turn, right, left, f.half_cells)
         f.slope = f.half * slope
-    f.force, f.touching = f.half * force, f.half * touching
+    f.force = f.half * force
+    f.touching = f.half * touching

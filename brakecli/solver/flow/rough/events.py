@@ -18,7 +18,9 @@ LANDING = 16  # parts of a step in which the whole pad lands or lifts off: the f
 _ROUNDED = 1e-9  # of a step, that may be left of it by rounding
 _SEEKS = 60  # steps of the search for an event
 _ABOVE = 0.75  # of a part at which a margin is negative, the middle of a bracket from its half on
-_CERTAIN, _NARROWEST = 0.01, 1e-16  # of the rounding of a margin, and of a step: ends of that search
+# of the rounding of a margin, and of a step: ends of that search
+_CERTAIN = 0.01
+_NARROWEST = 1e-16
 _STRETCHED = 1.5  # times the longest part, up to which the last one is stretched: none is shorter than half of it
 _SIGNALS = 1023  # steps between two looks at signals, plus one a power of two
 _NONE = -1
@@ -34,8 +36,11 @@ def _lowest(begin: float, rate: float, end: float, end_rate: float, h: float) ->
     """
     if not (rate < 0.0 < end_rate):
         return -1.0, end
-    b, e, d = h * rate, h * end_rate, end - begin
-    cubic, square = b + e - 2.0 * d, 3.0 * d - 2.0 * b - e
+    b = h * rate
+    e = h * end_rate
+    d = end - begin
+    cubic = b + e - 2.0 * d
+    square = 3.0 * d - 2.0 * b - e
     root = math.sqrt(max(square * square - 3.0 * cubic * b, 0.0))  # where 3 cubic p² + 2 square p + b = 0
     part = -b / (square + root) if square + root > 0.0 else 0.5
     part = min(max(part, 0.0), 1.0)
@@ -56,14 +61,17 @@ def _located(c: Coefficients, f: Any, tables: Floats, h: float, high: float, whi
 
     Newton's method, kept inside a bracket. A phase begins where its margin is zero: it must have risen before.
     """
-    low, noise, begin = 0.0, rounding(c, f), f.margin[which]
+    low = 0.0
+    noise = rounding(c, f)
+    begin = f.margin[which]
     if begin > noise:
         part = high * begin / (begin - _margin_at(c, f, tables, high * h, which))
     else:
         for _ in range(_SEEKS):
             part = 0.5 * high
             if _margin_at(c, f, tables, part * h, which) > 0.0:
-                low, part = part, _ABOVE * high
+                low = part
+                part = _ABOVE * high
                 break
             high = part
         if low == 0.0:
@@ -92,21 +100,26 @@ def _first_crossing(c: Coefficients, f: Any, tables: Floats, h: float) -> tuple[
 
     Notes how near margins come to zero.
     """
-    noise, dips = rounding(c, f), 0
-    which, high, first = _NONE, 1.0, 2.0
+    noise = rounding(c, f)
+    dips = 0
+    which = _NONE
+    high = 1.0
+    first = 2.0
     for i in range(2 if f.phase == STICK else 1):
         if f.end_margin[i] < -noise:
             fall = f.margin[i] - f.end_margin[i]
             part = f.margin[i] / fall if fall > 0.0 else 0.0
             if part < first:
-                which, first = i, part
+                which = i
+                first = part
     if which == _NONE:
         for i in range(2 if f.phase == STICK else 1):
             part, value = _lowest(f.margin[i], f.margin_rate[i], f.end_margin[i], f.end_margin_rate[i], h)
             if part >= 0.0 and value < -noise:
                 dips = 1
                 if _margin_at(c, f, tables, part * h, i) < -noise:
-                    which, high = i, part
+                    which = i
+                    high = part
                     break
             if part >= 0.0 and f.margin[i] > noise:  # not at the event that the phase begins with
                 if f.phase != STICK:
@@ -124,10 +137,12 @@ def _first_crossing(c: Coefficients, f: Any, tables: Floats, h: float) -> tuple[
 @kernel(void(ROUGH_TYPE, float64))
 def _note(f: Any, h: float) -> None:
     """Note extremes and shares of the step that was taken; its end is `end`, with its rates."""
-    least, x = -_lowest(-f.z[X], -f.z[V_X], -f.end[X], -f.end[V_X], h)[1], f.end[X]
+    least = -_lowest(-f.z[X], -f.z[V_X], -f.end[X], -f.end[V_X], h)[1]
+    x = f.end[X]
     f.most_x = max(f.most_x, x, least)
     f.least_x = min(f.least_x, x, _lowest(f.z[X], f.z[V_X], x, f.end[V_X], h)[1])
-    least, y = -_lowest(-f.z[Y], -f.z[V_Y], -f.end[Y], -f.end[V_Y], h)[1], f.end[Y]
+    least = -_lowest(-f.z[Y], -f.z[V_Y], -f.end[Y], -f.end[V_Y], h)[1]
+    y = f.end[Y]
     f.most_y = max(f.most_y, y, least)
     f.least_y = min(f.least_y, y, _lowest(f.z[Y], f.z[V_Y], y, f.end[V_Y], h)[1])
     f.stuck += h if f.phase == STICK else 0.0
@@ -143,7 +158,9 @@ def _advance(f: Any) -> None:
         f.z[i] = f.end[i]
     for i in range(2):
         f.margin[i], f.margin_rate[i] = f.end_margin[i], f.end_margin_rate[i]
-    f.before_force, f.before_slope, f.before_touching = f.force, f.slope, f.touching
+    f.before_force = f.force
+    f.before_slope = f.slope
+    f.before_touching = f.touching
     if f.tangents != 0:
         for i in range(4):
             for j in range(COLUMNS):
@@ -169,14 +186,19 @@ def _carry_to_event(c: Coefficients, f: Any, tables: Floats, h: float) -> int:
 
     The length p of the step changes by dp = -dm/(∂m/∂p), and the state by dz + ∂z/∂p dp.
     """
-    t, kept, late = f.t_end, f.t_kept, f.late_kept
+    t = f.t_end
+    kept = f.t_kept
+    late = f.late_kept
     for j in range(COLUMNS):
         f.stretch[j] = 0.0
     step(c, f, tables, h, 1)
     for j in range(COLUMNS):
-        late[j], f.late[j], f.stretch[j] = f.late[j], 0.0, 1.0
+        late[j] = f.late[j]
+        f.late[j] = 0.0
+        f.stretch[j] = 1.0
         for i in range(4):
-            kept[i, j], f.t[i, j] = t[i, j], 0.0
+            kept[i, j] = t[i, j]
+            f.t[i, j] = 0.0
     step(c, f, tables, h, 1)  # each column is now the derivative by the length of the step
     look(c, f, tables, 1)
     rate = _change(c, f, t[X, 0], t[Y, 0], t[V_X, 0], t[V_Y, 0], 1.0)
@@ -202,14 +224,25 @@ def _note_border(f: Any) -> None:
 @kernel(void(COEFFICIENTS, ROUGH_TYPE, vector), inlined=False)
 def _begin(c: Coefficients, f: Any, tables: Floats) -> None:
     """Prepare for the state `z`."""
-    f.since, f.length, f.place, f.known, f.events, f.anchor = 0.0, 0.0, math.nan, 0, 0, 0.0
-    f.open, f.stuck, f.least_contact, f.most_contact = 0.0, 0.0, math.inf, -math.inf
+    f.since = 0.0
+    f.length = 0.0
+    f.place = math.nan
+    f.known = 0
+    f.events = 0
+    f.anchor = 0.0
+    f.open = 0.0
+    f.stuck = 0.0
+    f.least_contact = math.inf
+    f.most_contact = -math.inf
     f.least_slide = f.least_hold = f.least_pass = math.inf
     for i in range(4):
         f.end[i] = f.z[i]
         for j in range(COLUMNS):
             f.t_end[i, j] = 1.0 if i == j else 0.0
-    f.least_x, f.most_x, f.least_y, f.most_y = f.z[X], f.z[X], f.z[Y], f.z[Y]
+    f.least_x = f.z[X]
+    f.most_x = f.z[X]
+    f.least_y = f.z[Y]
+    f.most_y = f.z[Y]
     press(f, tables, f.z[X], f.z[Y], f.tangents)
     f.phase = sliding_phase(f.z[V_X] - f.belt)
     if f.phase == UNDECIDED:
@@ -234,17 +267,22 @@ def _next_part(f: Any, end: float, longest: float) -> float:
 
 
 _PARTS = types.NamedTuple([COEFFICIENTS, ROUGH_TYPE, vector], Parts)
-hold, _parts_at = into_memory(_PARTS), from_memory(_PARTS)
+hold = into_memory(_PARTS)
+_parts_at = from_memory(_PARTS)
 
 
 @kernel(int64(int64, float64, int64))
 def fly(address: int, h: float, steps: int) -> int:
     """Take so many steps h (s) from the state `z`; a `Status`. The end is `end`, its derivatives `t_end`."""
     p: Parts = _parts_at(address)
-    c, f, tables = p.c, p.f, p.tables
+    c = p.c
+    f = p.f
+    tables = p.tables
     _begin(c, f, tables)
     for n in range(steps):
-        f.since, left, longest = n * h, h, h
+        f.since = n * h
+        left = h
+        longest = h
         for j in range(COLUMNS):
             f.late[j] = f.stretch[j] = 0.0
         while True:
@@ -267,7 +305,8 @@ def fly(address: int, h: float, steps: int) -> int:
                 continue
             if f.events == MOST_EVENTS:
                 return _TOO_MANY_EVENTS
-            f.which, part = int(which), part * left
+            f.which = int(which)
+            part = part * left
             if f.tangents != 0:
                 if _carry_to_event(c, f, tables, part) == 0:
                     return _GRAZED

@@ -10,7 +10,9 @@ from brakecli.solver.runge_kutta import USED
 MOST_EVENTS = 256  # in a span
 STAGES = int(USED[1])  # of a step
 COLUMNS = 4  # of the derivative
-EIGHT, FOUR = 8, 4  # lanes of sines; of nodes and waves in the tables
+# lanes of sines; of nodes and waves in the tables
+EIGHT = 8
+FOUR = 4
 
 
 class Status(IntEnum):

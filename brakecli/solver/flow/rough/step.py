@@ -12,7 +12,9 @@ from brakecli.solver.motions import V_X, V_Y, X, Y
 from brakecli.solver.records import COEFFICIENTS, Coefficients
 from brakecli.solver.runge_kutta import END_STAGE, NODES, A
 
-_A, _B, _C = A[1, :STAGES, :STAGES].copy(), A[1, END_STAGE, :STAGES].copy(), NODES[1, :STAGES].copy()
+_A = A[1, :STAGES, :STAGES].copy()
+_B = A[1, END_STAGE, :STAGES].copy()
+_C = NODES[1, :STAGES].copy()
 """DOPRI5, of order five. On 60 random rough pads its median error is a seventh of that of the classical method of
 order four at 160 evaluations of the contact to a period, and a fourth at 320. From 320 on DOP853 is worse than
 both, because the force of partial contact has kinks in its second derivative."""
@@ -25,13 +27,19 @@ def _find_tangents(c: Coefficients, f: Any, stage: int) -> None:
 
     δF_y = ∂F_y/∂x δ(x - Ut) + ∂F_y/∂y δy takes the place of F_y in (6) and (7). In stick δẍ = 0.
     """
-    grip, node, mass = (1 - f.phase) * c.phi, _C[stage], 1.0 / c.m
+    grip = (1 - f.phase) * c.phi
+    node = _C[stage]
+    mass = 1.0 / c.m
     slips = mass if f.phase != STICK else 0.0
     for j in range(COLUMNS):
-        x, y, v_x, v_y = f.t_w[X, j], f.t_w[Y, j], f.t_w[V_X, j], f.t_w[V_Y, j]
+        x = f.t_w[X, j]
+        y = f.t_w[Y, j]
+        v_x = f.t_w[V_X, j]
+        v_y = f.t_w[V_Y, j]
         moved = x - f.belt * (f.late[j] + node * f.stretch[j])
         pressed = f.slope * moved - f.touching * y
-        f.t_k[stage, X, j], f.t_k[stage, Y, j] = v_x, v_y
+        f.t_k[stage, X, j] = v_x
+        f.t_k[stage, Y, j] = v_y
         along = grip * pressed - (c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y)  # Eq. (6)
         f.t_k[stage, V_X, j] = slips * along
         across = pressed - (c.b_xy * v_x + c.b_yy * v_y + c.c_xy * x + c.c_yy * y)  # Eq. (7)
@@ -44,8 +52,12 @@ def _find_rates(c: Coefficients, f: Any, stage: int) -> None:
 
     m ẍ = -side φ F_y - (b_xx ẋ + b_xy ẏ + c_xx x + c_xy y + Q_x), in stick 0; m ÿ = F_y - (b_xy ẋ + … + Q_y).
     """
-    x, y, v_x, v_y = f.w[X], f.w[Y], f.w[V_X], f.w[V_Y]
-    f.k[stage, X], f.k[stage, Y] = v_x, v_y
+    x = f.w[X]
+    y = f.w[Y]
+    v_x = f.w[V_X]
+    v_y = f.w[V_Y]
+    f.k[stage, X] = v_x
+    f.k[stage, Y] = v_y
     if f.phase != STICK:
         against = c.b_xx * v_x + c.b_xy * v_y + c.c_xx * x + c.c_xy * y + f.pull_x
         f.k[stage, V_X] = ((1 - f.phase) * c.phi * f.force - against) / c.m  # Eq. (6) with Eq. (5)
@@ -69,7 +81,9 @@ def step(c: Coefficients, f: Any, tables: Floats, h: float, tangents: int) -> No
                 total += _A[s, r] * f.k[r, i]
             f.w[i] = f.z[i] + h * total
         if s == 0:
-            f.force, f.slope, f.touching = f.before_force, f.before_slope, f.before_touching
+            f.force = f.before_force
+            f.slope = f.before_slope
+            f.touching = f.before_touching
         else:
             place = f.anchor if f.phase == STICK else f.w[X] - f.belt * (f.since + _C[s] * h)
             press(f, tables, place, f.w[Y], tangents)
@@ -113,22 +127,35 @@ def find_margins(c: Coefficients, f: Any) -> None:
     """
     for i in range(4):
         f.w[i] = f.end[i]
-    kept_x, kept_y, kept_v_x, kept_v_y = f.k[0, X], f.k[0, Y], f.k[0, V_X], f.k[0, V_Y]
+    kept_x = f.k[0, X]
+    kept_y = f.k[0, Y]
+    kept_v_x = f.k[0, V_X]
+    kept_v_y = f.k[0, V_Y]
     _find_rates(c, f, 0)
     for i in range(4):
         f.rates[i] = f.k[0, i]
-    f.k[0, X], f.k[0, Y], f.k[0, V_X], f.k[0, V_Y] = kept_x, kept_y, kept_v_x, kept_v_y
-    x, y, v_x, v_y = f.end[X], f.end[Y], f.end[V_X], f.end[V_Y]
+    f.k[0, X] = kept_x
+    f.k[0, Y] = kept_y
+    f.k[0, V_X] = kept_v_x
+    f.k[0, V_Y] = kept_v_y
+    x = f.end[X]
+    y = f.end[Y]
+    v_x = f.end[V_X]
+    v_y = f.end[V_Y]
     if f.phase != STICK:
         side = f.phase - STICK
         f.end_margin[0], f.end_margin_rate[0] = side * (v_x - f.belt), side * f.rates[V_X]
-        f.end_margin[1], f.end_margin_rate[1] = 0.0, 0.0
+        f.end_margin[1] = 0.0
+        f.end_margin_rate[1] = 0.0
         return
-    needed, bound = _needed(c, f, x, y, v_x, v_y), c.phi * f.force
+    needed = _needed(c, f, x, y, v_x, v_y)
+    bound = c.phi * f.force
     change = c.b_xy * f.rates[V_Y] + c.c_xx * v_x + c.c_xy * v_y
     opens = -c.phi * f.touching * v_y
-    f.end_margin[0], f.end_margin_rate[0] = bound - needed, opens - change
-    f.end_margin[1], f.end_margin_rate[1] = bound + needed, opens + change
+    f.end_margin[0] = bound - needed
+    f.end_margin_rate[0] = opens - change
+    f.end_margin[1] = bound + needed
+    f.end_margin_rate[1] = opens + change
 
 
 @kernel(void(COEFFICIENTS, ROUGH_TYPE, vector, int64), inlined=False)
@@ -144,7 +171,10 @@ def rounding(c: Coefficients, f: Any) -> float:
     """The rounding of the margins at `end`: 1e-14 of the sum of the sizes of their terms."""
     if f.phase != STICK:
         return _ROUNDING * (abs(f.belt) + abs(f.end[V_X]))  # type: ignore[no-any-return]
-    x, y, v_x, v_y = abs(f.end[X]), abs(f.end[Y]), abs(f.end[V_X]), abs(f.end[V_Y])
+    x = abs(f.end[X])
+    y = abs(f.end[Y])
+    v_x = abs(f.end[V_X])
+    v_y = abs(f.end[V_Y])
     links = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + abs(f.pull_x)
     return _ROUNDING * (links + c.phi * f.force)  # type: ignore[no-any-return]
 
@@ -153,7 +183,8 @@ def rounding(c: Coefficients, f: Any) -> float:
 def take_hold(c: Coefficients, f: Any) -> None:
     """The phase at `end`, where the shoe moves with the wheel: stick where friction can hold it, (3)-(5)."""
     f.end[V_X] = f.belt
-    needed, bound = _needed(c, f, f.end[X], f.end[Y], f.belt, f.end[V_Y]), c.phi * f.force
+    needed = _needed(c, f, f.end[X], f.end[Y], f.belt, f.end[V_Y])
+    bound = c.phi * f.force
     f.phase = STICK  # `rounding` is that of forces
     noise = rounding(c, f)
     f.phase = held(bound - needed, bound + needed, noise, noise)

@@ -21,24 +21,33 @@ from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
 from brakecli.solver.tangent import renew
 from brakecli.solver.track import mark
 
-STATE, solve = MOTION, step
-LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
-begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weighted_time
+STATE = MOTION
+solve = step
+LAG = own_steps.LAG
+MEMORY = own_steps.MEMORY
+VELOCITIES = own_steps.VELOCITIES
+begin = own_steps.begin
+sample = own_steps.sample
+weighted_time = own_steps.weighted_time
 mechanical_energy = own_steps.mechanical_energy
 
 _PLANT = plant_type(MOTION)
-hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
+hold = into_memory(_PLANT)
+_plant_at = from_memory(_PLANT)
 _evaluate_at = at_address(EVALUATE)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 address(solve)  # compiled here, like all other kernels of a run: before anything is timed
 
-_BUDGET, _EXACT = 4096, 64
+_BUDGET = 4096
+_EXACT = 64
 """Steps of one call on smooth surfaces, and as how many one counts that finds patches. An interruption need not
 wait for a sample."""
-_PAIRS, _PAIRS_EXACT = 2000, 3
+_PAIRS = 2000
+_PAIRS_EXACT = 3
 """Pairs of waves that take as long as a step on smooth surfaces, in full contact and where patches are found."""
 
-_NONE, _COARSE = int(Failure.NONE), int(Failure.COARSE)
+_NONE = int(Failure.NONE)
+_COARSE = int(Failure.COARSE)
 
 
 def order(s: Weights, start: str) -> int:
@@ -49,41 +58,65 @@ def order(s: Weights, start: str) -> int:
 @kernel(void(SHOE, float64, int64), inlined=False)
 def _sample(p: Shoe, interval: float, level: int) -> None:
     """Put the sample of a level that the motion has reached into the state, with the forces at its time."""
-    c, m = p.c, p.motion
+    c = p.c
+    m = p.motion
     t = interval * level
     phase = m.phase
-    at, x, y, v_x, v_y = m.x, m.x, m.y, m.v_x, m.v_y
-    belt, belt_slope, load = m.belt, m.belt_slope, m.load
+    at = m.x
+    x = m.x
+    y = m.y
+    v_x = m.v_x
+    v_y = m.v_y
+    belt = m.belt
+    belt_slope = m.belt_slope
+    load = m.load
     if m.level > level or m.tau > ROUNDING * t:
         phase = m.phase_done
         since = (t - m.time_done) - m.tau_done
-        theta, rest, belt_slope = since / m.step_done, (m.time - t) + m.tau, m.belt_slope_done
-        belt, load = m.belt_done + belt_slope * since, m.load_done + m.load_slope_done * since
+        theta = since / m.step_done
+        rest = (m.time - t) + m.tau
+        belt_slope = m.belt_slope_done
+        belt = m.belt_done + belt_slope * since
+        load = m.load_done + m.load_slope_done * since
         passed = -(belt + 0.5 * belt_slope * rest) * rest  # by the wheel since the end of the step
-        x, y = interpolated(m, X, theta), interpolated(m, Y, theta)
-        v_x, v_y = interpolated(m, V_X, theta), interpolated(m, V_Y, theta)
+        x = interpolated(m, X, theta)
+        y = interpolated(m, Y, theta)
+        v_x = interpolated(m, V_X, theta)
+        v_y = interpolated(m, V_Y, theta)
         at = x - passed
         if phase == STICK:
-            at, x, v_x = m.x, m.x + passed, belt
+            at = m.x
+            x = m.x + passed
+            v_x = belt
     normal = max(press(p, at, y, phase), 0.0)
     bound = c.phi * normal
     against_x, _ = resistance(c, load, x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x  # Eq. (6) in stick
     holds = phase == STICK and abs(needed) <= bound * CONE
     state, friction = observed(side_of(phase), holds, needed, normal, bound)
-    m.row[0], m.row[1], m.row[2], m.row[3] = x, y, v_x, v_y
-    m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, p.layer.contact.fraction, state
+    m.row[0] = x
+    m.row[1] = y
+    m.row[2] = v_x
+    m.row[3] = v_y
+    m.row[4] = friction
+    m.row[5] = normal
+    m.row[6] = p.layer.contact.fraction
+    m.row[7] = state
 
 
 @kernel(void(SHOE, int64), inlined=False)
 def _mark(p: Shoe, samples: int) -> None:
     """Make a mark where the motion is."""
-    m, store = p.motion, p.motion.stores[0]
+    m = p.motion
+    store = p.motion.stores[0]
     if m.light == 1:
         _evaluate_at(p.layer.evaluate)(m.x, m.y, p.layer)
         store = p.layer.contact.store
     at = mark(p.track, p.work, m.level, samples, m.time + m.tau, store)
-    at[0], at[1], at[2], at[3] = m.x, m.y, m.v_x, m.v_y
+    at[0] = m.x
+    at[1] = m.y
+    at[2] = m.v_x
+    at[3] = m.v_y
 
 
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
@@ -93,9 +126,15 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     `rows` gets the samples before that of counts.level, which waits in the state; a failure adds it.
     """
     p: Plant = _plant_at(address)
-    m, counts, drive, grid, row, steps = p.state, p.counts, p.drive, p.grid, 0, 0
+    m = p.state
+    counts = p.counts
+    drive = p.drive
+    grid = p.grid
+    row = 0
+    steps = 0
     waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
-    shoe, track = Shoe(p.c, p.layer, m, p.work, counts, p.tangent, p.track), p.track
+    shoe = Shoe(p.c, p.layer, m, p.work, counts, p.tangent, p.track)
+    track = p.track
     if m.started == 0:
         first_step(shoe, drive, grid)
         _sample(shoe, grid.interval, 0)

@@ -29,7 +29,8 @@ PLACES, SHARES = (np.array([np.resize(0.5 * each[i] + 0.5 * (1 - i), 12) for eac
 _TERMS = 4
 """Terms of the series over up to 0.22 of a step, in which the fastest motion turns by less than half a radian."""
 _AT = STAGES - 1
-_FIRST, _ROUNDING = 16, 1e-12
+_FIRST = 16
+_ROUNDING = 1e-12
 """Part of a run in which no error is too large, and what of the largest place is rounding."""
 _MUCH = 0.3
 """Part of the pad that comes or goes in a step, from which on more places are looked at."""
@@ -38,22 +39,47 @@ _MUCH = 0.3
 @kernel(void(SHOE, float64), inlined=False)
 def _ahead(p: Shoe, tau: float) -> None:
     """Carry errors and disturbance by exp(A τ) e = Σ (A τ)^n e/n!, with the contact at the last place."""
-    c, m = p.c, p.motion
-    grip, stiffness, tangential = -side_of(m.phase) * c.phi, m.touch[_AT, 0], m.touch[_AT, 1]
-    free, whole = 0.0 if m.phase == STICK else 1.0 / c.m, 1.0 / c.m
-    x_x, x_y = free * (grip * tangential - c.c_xx), free * (-grip * stiffness - c.c_xy)
-    y_x, y_y = whole * (tangential - c.c_xy), whole * (-stiffness - c.c_yy)
-    x_u, x_w, y_u, y_w = -free * c.b_xx, -free * c.b_xy, -whole * c.b_xy, -whole * c.b_yy
+    c = p.c
+    m = p.motion
+    grip = -side_of(m.phase) * c.phi
+    stiffness = m.touch[_AT, 0]
+    tangential = m.touch[_AT, 1]
+    free = 0.0 if m.phase == STICK else 1.0 / c.m
+    whole = 1.0 / c.m
+    x_x = free * (grip * tangential - c.c_xx)
+    x_y = free * (-grip * stiffness - c.c_xy)
+    y_x = whole * (tangential - c.c_xy)
+    y_y = whole * (-stiffness - c.c_yy)
+    x_u = -free * c.b_xx
+    x_w = -free * c.b_xy
+    y_u = -whole * c.b_xy
+    y_w = -whole * c.b_yy
     for kind in range(DISTURBED + p.tangent.on):
         e = p.tangent.error[kind]
-        x, y, u, w = e[X], e[Y], e[V_X], e[V_Y]
-        d_x, d_y, d_u, d_w = x, y, u, w
+        x = e[X]
+        y = e[Y]
+        u = e[V_X]
+        w = e[V_Y]
+        d_x = x
+        d_y = y
+        d_u = u
+        d_w = w
         for n in range(1, _TERMS + 1):
             part = tau / n
-            a_x, a_y = x_x * d_x + x_y * d_y + x_u * d_u + x_w * d_w, y_x * d_x + y_y * d_y + y_u * d_u + y_w * d_w
-            d_x, d_y, d_u, d_w = part * d_u, part * d_w, part * a_x, part * a_y
-            x, y, u, w = x + d_x, y + d_y, u + d_u, w + d_w
-        e[X], e[Y], e[V_X], e[V_Y] = x, y, u, w
+            a_x = x_x * d_x + x_y * d_y + x_u * d_u + x_w * d_w
+            a_y = y_x * d_x + y_y * d_y + y_u * d_u + y_w * d_w
+            d_x = part * d_u
+            d_y = part * d_w
+            d_u = part * a_x
+            d_w = part * a_y
+            x = x + d_x
+            y = y + d_y
+            u = u + d_u
+            w = w + d_w
+        e[X] = x
+        e[Y] = y
+        e[V_X] = u
+        e[V_Y] = w
 
 
 @kernel(float64(float64))
@@ -65,12 +91,14 @@ def _size(error: float) -> float:
 @kernel(int64(SHOE, GRID))
 def _beyond(p: Shoe, grid: Grid) -> int:
     """1 where the error is more than the most; at first, when the motion is small, it says nothing."""
-    m, t = p.motion, p.tangent
+    m = p.motion
+    t = p.tangent
     if t.knows == 0:
         return 0
     rounding = _ROUNDING * max(m.largest[X], m.largest[Y])
     for i in range(4):
-        size, error = max(m.largest[i], abs(m.end[i])), abs(t.error[0, i])
+        size = max(m.largest[i], abs(m.end[i]))
+        error = abs(t.error[0, i])
         if size > rounding * (t.rate if i >= V_X else 1.0) and not error <= t.most * size:
             return 1 if m.level > grid.samples // _FIRST else 0
     return 0
@@ -82,22 +110,35 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
 
     At each place of Gauss's rule that is its share of u' - f(u), and of what the midpoint rule leaves out of F_y.
     """
-    c, m, t, step = p.c, p.motion, p.tangent, p.motion.step_done
-    rule, light = m.pair, m.light
+    c = p.c
+    m = p.motion
+    t = p.tangent
+    step = p.motion.step_done
+    rule = m.pair
+    light = m.light
     m.light = 0
-    pad, changes = p.layer.pad, abs(m.touch[0, 0] - m.touch[END_STAGE, 0])
+    pad = p.layer.pad
+    changes = abs(m.touch[0, 0] - m.touch[END_STAGE, 0])
     opens = m.phase != OPEN and m.begin[Y] + runge_kutta.reach(m, Y) > pad.full_up_to
     if changes > _MUCH * 2.0 * pad.half_length * pad.k or (m.pair == 0 and opens):
         rule = 2
     elif changes > 0.0:
         rule = 0
-    e, n, w, begin, t.moved = t.error[0], t.error[1], t.error[DISTURBED], 0.0, 0.0
-    w[X], w[Y], w[V_X], w[V_Y] = t.x, t.y, t.v_x, t.v_y
+    e = t.error[0]
+    n = t.error[1]
+    w = t.error[DISTURBED]
+    begin = 0.0
+    t.moved = 0.0
+    w[X] = t.x
+    w[Y] = t.y
+    w[V_X] = t.v_x
+    w[V_Y] = t.v_y
     worst = t.worst[min(m.level * SPANS // grid.samples, SPANS - 1)]
     for place in range(POINTS[rule]):
         if stopped(pad.signals):  # an evaluation may take as long as a step
             break
-        theta, part = PLACES[rule, place], step * SHARES[rule, place]
+        theta = PLACES[rule, place]
+        part = step * SHARES[rule, place]
         at_x, slope_x = runge_kutta.interpolated_both(m, X, theta)
         at_y, slope_y = runge_kutta.interpolated_both(m, Y, theta)
         at_v_x, slope_v_x = runge_kutta.interpolated_both(m, V_X, theta)
@@ -106,9 +147,12 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
         missing = left_out(at_y, p.layer) / c.m if p.layer.contact.kind == MIDPOINT else 0.0
         before = theta - begin
         _ahead(p, before * step)
-        d_x, d_y = part * (slope_x / step - m.slopes[_AT, X]), part * (slope_y / step - m.slopes[_AT, Y])
-        d_u, d_w = part * (slope_v_x / step - m.slopes[_AT, V_X]), part * (slope_v_y / step - m.slopes[_AT, V_Y])
-        n_u, n_w = part * side_of(m.phase) * c.phi * missing, -part * missing
+        d_x = part * (slope_x / step - m.slopes[_AT, X])
+        d_y = part * (slope_y / step - m.slopes[_AT, Y])
+        d_u = part * (slope_v_x / step - m.slopes[_AT, V_X])
+        d_w = part * (slope_v_y / step - m.slopes[_AT, V_Y])
+        n_u = part * side_of(m.phase) * c.phi * missing
+        n_w = -part * missing
         if m.phase == STICK:
             d_x = d_u = 0.0
         e[X], e[Y], e[V_X], e[V_Y] = e[X] + d_x, e[Y] + d_y, e[V_X] + d_u, e[V_Y] + d_w
@@ -126,6 +170,9 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
     _ahead(p, h - step)
     if c.phi > 0.0 and m.lowest < phases.NEAR * t.moved:  # without friction nothing happens there
         t.unsure = min(t.unsure, m.time + m.tau)
-    t.x, t.y, t.v_x, t.v_y = w[X], w[Y], w[V_X], w[V_Y]
+    t.x = w[X]
+    t.y = w[Y]
+    t.v_x = w[V_X]
+    t.v_y = w[V_Y]
     t.beyond = _beyond(p, grid)
     m.light = light

@@ -20,9 +20,11 @@ _BESIDE = 1e-3
 """Part of a step over which a margin rises or falls at its ends."""
 _APART = 0.05
 """Part of a step between the places of a parabola."""
-_GOLDEN, _GOLDEN_STEPS = 0.3819660112501051, 40
+_GOLDEN = 0.3819660112501051
+_GOLDEN_STEPS = 40
 """Part of a bracket at which it is divided, and how often: to 1e-8 of itself, and 1e-16 in the value."""
-_SECANTS, _MOST_STEPS = 20, 100
+_SECANTS = 20
+_MOST_STEPS = 100
 """Steps of the search for a root by secants, after which brackets are halved, and all of them."""
 _SOUGHT = 8
 """Places at which a margin that begins at zero is sought above it."""
@@ -49,10 +51,12 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
 
     Near enough for Newton's iteration on the true motion to make it exact.
     """
-    low, high = margins(p, h, left)[which], margins(p, h, right)[which]
+    low = margins(p, h, left)[which]
+    high = margins(p, h, right)[which]
     if low <= 0.0:
         return left
-    place, moved = left, 0
+    place = left
+    moved = 0
     for turn in range(_MOST_STEPS):
         new = left + (right - left) * (low / (low - high))
         if turn > _SECANTS or not left < new < right:
@@ -62,11 +66,13 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
         place = new
         value = margins(p, h, place)[which]
         if value > 0.0:
-            left, low = place, value
+            left = place
+            low = value
             high *= 0.5 if moved == 1 else 1.0  # Illinois: the end that stays twice counts less
             moved = 1
         elif value < 0.0:
-            right, high = place, value
+            right = place
+            high = value
             low *= 0.5 if moved == -1 else 1.0
             moved = -1
         else:
@@ -77,17 +83,23 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
 @kernel(types.UniTuple(float64, 2)(SHOE, int64, float64, float64, float64), inlined=False)
 def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[float, float]:
     """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
-    a, b = left + _GOLDEN * (right - left), right - _GOLDEN * (right - left)
-    at_a, at_b = margins(p, h, a)[which], margins(p, h, b)[which]
+    a = left + _GOLDEN * (right - left)
+    b = right - _GOLDEN * (right - left)
+    at_a = margins(p, h, a)[which]
+    at_b = margins(p, h, b)[which]
     for _ in range(_GOLDEN_STEPS):
         if at_a < 0.0 or at_b < 0.0:
             break
         if at_a < at_b:
-            right, b, at_b = b, a, at_a
+            right = b
+            b = a
+            at_b = at_a
             a = left + _GOLDEN * (right - left)
             at_a = margins(p, h, a)[which]
         else:
-            left, a, at_a = a, b, at_b
+            left = a
+            a = b
+            at_a = at_b
             b = right - _GOLDEN * (right - left)
             at_b = margins(p, h, b)[which]
     return (a, at_a) if at_a < at_b else (b, at_b)
@@ -100,8 +112,10 @@ def _depth(p: Shoe, which: int, h: float, root: float) -> float:
     With m_1 and m_2 at one and two distances before the root that is (2 m_1 - m_2/2)²/2(m_2 - 2 m_1).
     """
     apart = 0.5 * min(root, 2.0 * _APART)
-    one, two = margins(p, h, root - apart)[which], margins(p, h, root - 2.0 * apart)[which]
-    fall, bend = 2.0 * one - 0.5 * two, two - 2.0 * one
+    one = margins(p, h, root - apart)[which]
+    two = margins(p, h, root - 2.0 * apart)[which]
+    fall = 2.0 * one - 0.5 * two
+    bend = two - 2.0 * one
     return 0.5 * fall * fall / bend if bend > 0.0 else math.inf
 
 
@@ -114,7 +128,8 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
     `near` to zero. How low it gets without an event is kept, and how far it would fall behind one, as the error of
     the motion may make an event of it, or none.
     """
-    m, sliding = p.motion, side_of(p.motion.phase) * (p.motion.begin[V_X] - p.motion.belt)
+    m = p.motion
+    sliding = side_of(p.motion.phase) * (p.motion.begin[V_X] - p.motion.belt)
     near = 2.0 * NEAR * p.tangent.moved if p.tangent.knows == 1 else 0.0
     far = reach(m, V_X) + abs(m.belt_slope) * h + near
     m.lowest = math.inf
@@ -124,11 +139,17 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
     allowed = _allowances(p)
     before_last = last = margins(p, h, 0.0)
     for look in range(1, LOOKS + 1):
-        theta, found, first = look / LOOKS, NONE, math.inf
+        theta = look / LOOKS
+        found = NONE
+        first = math.inf
         now = margins(p, h, theta)
         for which in range(3):
-            left, right, dip, until = (look - 1) / LOOKS, 0.0, -1.0, 0.0
-            bend, rise = before_last[which] - 2.0 * last[which] + now[which], now[which] - before_last[which]
+            left = (look - 1) / LOOKS
+            right = 0.0
+            dip = -1.0
+            until = 0.0
+            bend = before_last[which] - 2.0 * last[which] + now[which]
+            rise = now[which] - before_last[which]
             if now[which] < -allowed[which]:
                 right = theta
                 if look == 1 and last[which] <= allowed[which]:  # it begins at zero: where is it positive?
@@ -140,26 +161,32 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                     else:
                         return which, 0.0
             elif look == 1 and allowed[which] < last[which] <= now[which]:
-                dip, until = 0.0 if margins(p, h, _BESIDE)[which] < last[which] else -1.0, theta
+                dip = 0.0 if margins(p, h, _BESIDE)[which] < last[which] else -1.0
+                until = theta
             elif before_last[which] > last[which] <= now[which] and rise * rise > _FALLS * bend * (
                 last[which] - near
             ):
-                dip, until = theta - 2.0 / LOOKS, theta
+                dip = theta - 2.0 / LOOKS
+                until = theta
             if right == 0.0 and dip < 0.0 and look == LOOKS and now[which] <= last[which]:
-                dip, until = left if margins(p, h, 1.0 - _BESIDE)[which] < now[which] else -1.0, theta
+                dip = left if margins(p, h, 1.0 - _BESIDE)[which] < now[which] else -1.0
+                until = theta
             if dip >= 0.0:
                 place, value = lowest(p, which, h, dip, until)
                 if value < -allowed[which]:
-                    left, right = dip, place
+                    left = dip
+                    right = place
                 elif which != HEIGHT:
                     m.lowest = min(m.lowest, value)
             if right > 0.0:
                 root = _root(p, which, h, left, right)
                 if root < first:
-                    found, first = which, root
+                    found = which
+                    first = root
         if found != NONE:
             if found != HEIGHT:
                 m.lowest = min(m.lowest, _depth(p, found, h, first))
             return found, first
-        before_last, last = last, now
+        before_last = last
+        last = now
     return NONE, 1.0

@@ -69,9 +69,15 @@ def resistance(c: Coefficients, load: float, x: float, y: float, v_x: float, v_y
 @kernel(_PAIR(SHOE), inlined=False)
 def rounding(p: Shoe) -> tuple[float, float]:
     """Rounding in the tangential and in the normal balance of forces, N: 4 ε times the sizes of their terms."""
-    c, pad, m = p.c, p.layer.pad, p.motion
-    x, y, v_x, v_y = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
-    load, normal = abs(m.load), 0.0
+    c = p.c
+    pad = p.layer.pad
+    m = p.motion
+    x = abs(m.x)
+    y = abs(m.y)
+    v_x = abs(m.v_x)
+    v_y = abs(m.v_y)
+    load = abs(m.load)
+    normal = 0.0
     if m.phase != OPEN:
         normal = 2.0 * pad.half_length * pad.k * (y + pad.wheel_bound + pad.shoe_bound)
     along = c.b_xx * v_x + abs(c.b_xy) * v_y + c.c_xx * x + abs(c.c_xy) * y + load * abs(c.sin_beta)
@@ -83,16 +89,21 @@ def rounding(p: Shoe) -> tuple[float, float]:
 @kernel(void(SHOE, records.DRIVE), inlined=False)
 def arrive(p: Shoe, drive: Drive) -> None:
     """What acts from outside at the time reached and, as no knot lies inside a step, all through the next step."""
-    m, t, tau = p.motion, p.motion.time, p.motion.tau
+    m = p.motion
+    t = p.motion.time
+    tau = p.motion.tau
     after = t + tau + ROUNDING * (t + tau)  # a knot within the rounding of the time has been reached
-    m.belt, m.belt_slope = value_at(drive.belt, t + tau), slope_at(drive.belt, after)
-    m.load, m.load_slope = value_at(drive.load, t + tau), slope_at(drive.load, after)
+    m.belt = value_at(drive.belt, t + tau)
+    m.belt_slope = slope_at(drive.belt, after)
+    m.load = value_at(drive.load, t + tau)
+    m.load_slope = slope_at(drive.load, after)
     m.travel, m.travel_low = integral_at(drive.belt, t, tau)
     if p.layer.pad.wheel_terms > 0:
         turn(m.travel, m.travel_low, p.layer)
     m.pressed_x = math.nan
     if m.started != 0 and m.phase == STICK:
-        m.x, m.v_x = carried(m.anchor, m.anchor_low, m.travel, m.travel_low), m.belt
+        m.x = carried(m.anchor, m.anchor_low, m.travel, m.travel_low)
+        m.v_x = m.belt
 
 
 @kernel(float64(SHOE, float64, float64, int64))
@@ -101,7 +112,8 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
 
     x is less what the wheel has travelled since the time that `angles` belong to.
     """
-    pad, contact = p.layer.pad, p.layer.contact
+    pad = p.layer.pad
+    contact = p.layer.contact
     if phase == OPEN:
         clear(contact)
         return 0.0
@@ -110,10 +122,14 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.stiffness = 2.0 * pad.half_length * pad.k
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
-        contact.store_x, contact.tangential, contact.kind, contact.valid = 0.0, 0.0, CLOSED_FORM, 1
+        contact.store_x = 0.0
+        contact.tangential = 0.0
+        contact.kind = CLOSED_FORM
+        contact.valid = 1
         contact.store = 0.5 * contact.stiffness * y * y
         return contact.normal_force  # type: ignore[no-any-return]
-    full, m = coverage(y, pad) == FULL, p.motion
+    full = coverage(y, pad) == FULL
+    m = p.motion
     light = m.light == 1
     if not full or p.layer.window.rows > 0:
         _evaluate_at(p.layer.press if light else p.layer.evaluate)(x, y, p.layer)
@@ -122,12 +138,16 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
     elif not light:
         full_contact(x, y, p.layer)
     elif x == m.pressed_x:  # in stick; the force is linear in y
-        contact.stiffness, contact.fraction = 2.0 * pad.half_length * pad.k, 1.0
+        contact.stiffness = 2.0 * pad.half_length * pad.k
+        contact.fraction = 1.0
         contact.normal_force = m.pressed - contact.stiffness * (y - m.pressed_y)
-        contact.kind, contact.valid = CLOSED_FORM, 1
+        contact.kind = CLOSED_FORM
+        contact.valid = 1
     else:
         full_press(x, y, p.layer)
-        m.pressed_x, m.pressed_y, m.pressed = x, y, contact.normal_force
+        m.pressed_x = x
+        m.pressed_y = y
+        m.pressed = contact.normal_force
     return contact.normal_force  # type: ignore[no-any-return]
 
 
@@ -138,20 +158,28 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     The powers are F_x U, -F_x (ẋ - U), ẋ b_xx ẋ + 2 ẋ b_xy ẏ + ẏ b_yy ẏ, Q_x ẋ + Q_y ẏ, and that of the roughness.
     In stick x and its velocity are the wheel's, whatever is given.
     """
-    c, m = p.c, p.motion
-    side, stuck, load = side_of(m.phase), m.phase == STICK, m.load + m.load_slope * since
-    belt, travel = m.belt + m.belt_slope * since, (m.belt + 0.5 * m.belt_slope * since) * since
+    c = p.c
+    m = p.motion
+    side = side_of(m.phase)
+    stuck = m.phase == STICK
+    load = m.load + m.load_slope * since
+    belt = m.belt + m.belt_slope * since
+    travel = (m.belt + 0.5 * m.belt_slope * since) * since
     at = x - travel
     if stuck:
-        at, x, v_x = m.x, m.x + travel, belt
+        at = m.x
+        x = m.x + travel
+        v_x = belt
     normal = press(p, at, y, m.phase)
     against_x, against_y = resistance(c, load, x, y, v_x, v_y)
     friction = c.m * m.belt_slope + against_x if stuck else -side * c.phi * normal  # Eq. (4), Eq. (5)
     sliding = v_x - belt
-    m.slopes[stage, 0], m.slopes[stage, 1] = v_x, v_y
+    m.slopes[stage, 0] = v_x
+    m.slopes[stage, 1] = v_y
     m.slopes[stage, 2] = m.belt_slope if stuck else (friction - against_x) / c.m  # Eq. (6)
     m.slopes[stage, 3] = (normal - against_y) / c.m  # Eq. (7)
-    m.touch[stage, 0], m.touch[stage, 1] = p.layer.contact.stiffness, p.layer.contact.tangential
+    m.touch[stage, 0] = p.layer.contact.stiffness
+    m.touch[stage, 1] = p.layer.contact.tangential
     m.stores[stage] = p.layer.contact.store
     m.work_rates[stage, 0] = friction * belt
     m.work_rates[stage, 1] = -friction * sliding
@@ -167,11 +195,14 @@ def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
 
     In flight y - clear; otherwise clear - y, in slip side (ẋ - U), in stick φ F_y - needed and φ F_y + needed.
     """
-    c, m, since = p.c, p.motion, theta * h
+    c = p.c
+    m = p.motion
+    since = theta * h
     y = interpolated(m, Y, theta)
     if m.phase == OPEN:
         return y - p.layer.pad.clear_from, 1.0, 1.0
-    height, belt = p.layer.pad.clear_from - y, m.belt + m.belt_slope * since
+    height = p.layer.pad.clear_from - y
+    belt = m.belt + m.belt_slope * since
     if m.phase != STICK:
         return height, side_of(m.phase) * (interpolated(m, V_X, theta) - belt), 1.0
     x = m.x + (m.belt + 0.5 * m.belt_slope * since) * since
@@ -185,8 +216,12 @@ def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
 @kernel(float64(SHOE, int64), inlined=False)
 def margin_slope(p: Shoe, which: int) -> float:
     """Rate of a margin at the end of a step, from the slopes and the contact there."""
-    c, m = p.c, p.motion
-    x, y, v_x, v_y = m.slopes[END_STAGE, 0], m.slopes[END_STAGE, 1], m.slopes[END_STAGE, 2], m.slopes[END_STAGE, 3]
+    c = p.c
+    m = p.motion
+    x = m.slopes[END_STAGE, 0]
+    y = m.slopes[END_STAGE, 1]
+    v_x = m.slopes[END_STAGE, 2]
+    v_y = m.slopes[END_STAGE, 3]
     if which == HEIGHT:
         return y if m.phase == OPEN else -y  # type: ignore[no-any-return]
     if m.phase != STICK:
@@ -202,9 +237,13 @@ def cone(p: Shoe, since: float, x: float, y: float, v_x: float, v_y: float) -> t
 
     φ F_y - |needed|, and |δ needed| + φ |∂F_y/∂x δx + ∂F_y/∂y δy|.
     """
-    c, m, e, n = p.c, p.motion, p.tangent.error[0], p.tangent.error[1]
+    c = p.c
+    m = p.motion
+    e = p.tangent.error[0]
+    n = p.tangent.error[1]
     against, _ = resistance(c, m.load + m.load_slope * since, x, y, v_x, v_y)
-    d_x, d_y = e[X] + n[X], e[Y] + n[Y]
+    d_x = e[X] + n[X]
+    d_y = e[Y] + n[Y]
     more, _ = resistance(c, 0.0, d_x, d_y, e[V_X] + n[V_X], e[V_Y] + n[V_Y])
     pressed = p.layer.contact.tangential * d_x - p.layer.contact.stiffness * d_y
     within = c.phi * p.layer.contact.normal_force - abs(c.m * m.belt_slope + against)
@@ -217,12 +256,15 @@ def take_hold(p: Shoe) -> None:
 
     A shoe that slips on keeps its velocity: the wheel's is as uncertain as the time, however fast it changes.
     """
-    c, m = p.c, p.motion
+    c = p.c
+    m = p.motion
     bound = c.phi * press(p, m.x, m.y, STICK)
     against_x, _ = resistance(c, m.load, m.x, m.y, m.belt, m.v_y)
-    needed, (along, _) = c.m * m.belt_slope + against_x, rounding(p)
+    needed = c.m * m.belt_slope + against_x
+    along, _ = rounding(p)
     m.phase = held(bound - needed, bound + needed, along, along)
-    part, t = kept(needed, bound), p.tangent
+    part = kept(needed, bound)
+    t = p.tangent
     if t.knows == 1 and bound > 0.0:
         margin, moved = cone(p, 0.0, m.x, m.y, m.belt, m.v_y)
         if abs(margin) < NEAR * moved:

@@ -23,19 +23,25 @@ from brakecli.solver.track import enter, put, turned
 
 _LOCAL = 0.05
 """Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
-_DEFECT, _EARLY, _LATE = 20.0, 0.47, 0.93
+_DEFECT = 20.0
+_EARLY = 0.47
+_LATE = 0.93
 """Allowed defect of a step over its allowed error, and the parts of the step where it is taken, between stages."""
 _DENSE_ROUNDING = 63.0
 """The continuous solution's slope there is rounded so many times more than the slopes of the stages."""
-_SAFETY, _LEAST, _MOST = 0.9, 0.2, 6.0
+_SAFETY = 0.9
+_LEAST = 0.2
+_MOST = 6.0
 """The part that is taken of the step that the error asks for, and the bounds of a step's change."""
 _RADIANS = 2.0
 """Largest angle that the fastest motion turns by in a step, so that the looks at the margins follow it."""
 _DECAY = 4.0
 """Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
-_FIRST, _FIRST_ON_NODES = 0.05, 0.25
+_FIRST = 0.05
+_FIRST_ON_NODES = 0.25
 """The first step over the longest."""
-_MANY_SWITCHES, _CLOSER = 2, 0.1
+_MANY_SWITCHES = 2
+_CLOSER = 0.1
 """Phases that end at once, after which the next step is shorter: closer by, one of them does not end."""
 _MOST_SWITCHES = 60
 """A run ends after so many phases that end at once."""
@@ -69,7 +75,9 @@ def _longest(p: Shoe, duration: float) -> float:
     2 rad over its bound of the angular frequency, √(stiffness/m), 4 over its bound of the decay rate, (b_xx +
     b_yy)/m, and a part of the shortest wave over the sliding speed.
     """
-    c, m, pad = p.c, p.motion, p.layer.pad
+    c = p.c
+    m = p.motion
+    pad = p.layer.pad
     stiffness = (1.0 + c.phi) * (2.0 * pad.half_length * pad.k) if m.phase != OPEN else 0.0
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + stiffness  # of the largest eigenvalue of the stiffness
     longest = duration
@@ -111,11 +119,14 @@ def _defect(p: Shoe, h: float) -> float:
     It is |du/dθ - h f(u)|. The error estimate is a linear functional of the slopes, which vanishes for a kink at
     certain places of a step.
     """
-    m, worst = p.motion, 0.0
+    m = p.motion
+    worst = 0.0
     along, across = phases.rounding(p)
     for theta in (_EARLY, _LATE):
-        x, y = runge_kutta.interpolated(m, X, theta), runge_kutta.interpolated(m, Y, theta)
-        v_x, v_y = runge_kutta.interpolated(m, V_X, theta), runge_kutta.interpolated(m, V_Y, theta)
+        x = runge_kutta.interpolated(m, X, theta)
+        y = runge_kutta.interpolated(m, Y, theta)
+        v_x = runge_kutta.interpolated(m, V_X, theta)
+        v_y = runge_kutta.interpolated(m, V_Y, theta)
         phases.find_slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
         for i in (V_X, V_Y):
             if m.phase == STICK and i == V_X:
@@ -134,7 +145,8 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
     The error is that of the worst component over what the tolerance and rounding leave it.
     """
     m = p.motion
-    worst, used = 0.0, USED[m.pair]
+    worst = 0.0
+    used = USED[m.pair]
     m.begin[X], m.begin[Y], m.begin[V_X], m.begin[V_Y] = m.x, m.y, m.v_x, m.v_y
     for stage in range(1, STAGES):
         if used <= stage < END_STAGE:
@@ -158,11 +170,16 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
             if m.pair == 1:
                 break
         x, y, v_x, v_y = runge_kutta.combined(m, stage)
-        x, y = m.begin[X] + h * x, m.begin[Y] + h * y
-        v_x, v_y = m.begin[V_X] + h * v_x, m.begin[V_Y] + h * v_y
+        x = m.begin[X] + h * x
+        y = m.begin[Y] + h * y
+        v_x = m.begin[V_X] + h * v_x
+        v_y = m.begin[V_Y] + h * v_y
         phases.find_slopes(p, stage, NODES[m.pair, stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
-            m.end[X], m.end[Y], m.end[V_X], m.end[V_Y] = x, y, v_x, v_y
+            m.end[X] = x
+            m.end[Y] = y
+            m.end[V_X] = v_x
+            m.end[V_Y] = v_y
             if p.layer.contact.valid == 0:
                 return math.inf
     runge_kutta.make_continuous(m, h)
@@ -177,7 +194,8 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
     A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact.
     Where a loose tolerance lets the step come to another place, it is made anew.
     """
-    m, longest = p.motion, p.motion.step_done
+    m = p.motion
+    longest = p.motion.step_done
     for _ in range(_AGAIN):
         if _try(p, h, math.inf) == math.inf:
             return 0.0
@@ -209,14 +227,26 @@ def _meet(p: Shoe) -> None:
 
     A contact that vanishes has a force that grows with its age to the power 3/2, so that its age is 3/2 F/|dF/dt|.
     """
-    m, stage, meets = p.motion, END_STAGE, p.motion.touch[END_STAGE, 0] > 0.0
-    x, y, v_x, v_y, since = m.end[X], m.end[Y], m.end[V_X], m.end[V_Y], m.step_done
+    m = p.motion
+    stage = END_STAGE
+    meets = p.motion.touch[END_STAGE, 0] > 0.0
+    x = m.end[X]
+    y = m.end[Y]
+    v_x = m.end[V_X]
+    v_y = m.end[V_Y]
+    since = m.step_done
     if not meets:
-        stage, x, y, v_x, v_y, since = 0, m.begin[X], m.begin[Y], m.begin[V_X], m.begin[V_Y], 0.0
+        stage = 0
+        x = m.begin[X]
+        y = m.begin[Y]
+        v_x = m.begin[V_X]
+        v_y = m.begin[V_Y]
+        since = 0.0
     _, against = phases.resistance(p.c, m.load + m.load_slope * since, x, y, v_x, v_y)
     force = p.c.m * m.slopes[stage, V_Y] + against
     rate = m.touch[stage, 1] * (v_x - m.belt - m.belt_slope * since) - m.touch[stage, 0] * v_y
-    age, part = 1.5 * force, 1.0
+    age = 1.5 * force
+    part = 1.0
     if age < abs(rate) * m.step_done:
         part = max(age / abs(rate) / m.step_done, 0.0)
     theta = 1.0 - part if meets else part
@@ -234,10 +264,12 @@ def _meet(p: Shoe) -> None:
 @kernel(void(SHOE), inlined=False)
 def _follow(p: Shoe) -> None:
     """Note a turning point on the continuous solution of the step that has been made, and what the pad does."""
-    m, track = p.motion, p.track
+    m = p.motion
+    track = p.track
     kind = turned(track, m.end[V_X])
     if kind >= 0:
-        first, last = m.begin[V_X], m.end[V_X]
+        first = m.begin[V_X]
+        last = m.end[V_X]
         theta = first / (first - last) if first * last < 0.0 else 0.0
         for _ in range(_CORRECTED):
             velocity, slope = runge_kutta.interpolated_both(m, V_X, theta)
@@ -253,19 +285,29 @@ def _follow(p: Shoe) -> None:
 @kernel(void(SHOE, DRIVE, GRID, float64, int64))
 def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
-    m, work, interval = p.motion, p.work, grid.interval
+    m = p.motion
+    work = p.work
+    interval = grid.interval
     if p.tangent.on == 1 or p.tangent.knows == 1:
         grow(p, h, grid)
     if p.track.on == 1:
         _follow(p)
-    m.time_done, m.tau_done, m.phase_done = m.time, m.tau, m.phase
-    m.belt_done, m.belt_slope_done, m.load_done, m.load_slope_done = m.belt, m.belt_slope, m.load, m.load_slope
+    m.time_done = m.time
+    m.tau_done = m.tau
+    m.phase_done = m.phase
+    m.belt_done = m.belt
+    m.belt_slope_done = m.belt_slope
+    m.load_done = m.load
+    m.load_slope_done = m.load_slope
     work.belt += h * _passed(m, 0)
     work.friction += h * _passed(m, 1)
     work.dashpots += h * _passed(m, 2)
     work.load += h * _passed(m, 3)
     work.roughness += h * _passed(m, 4)
-    m.x, m.y, m.v_x, m.v_y = m.end[X], m.end[Y], m.end[V_X], m.end[V_Y]
+    m.x = m.end[X]
+    m.y = m.end[Y]
+    m.v_x = m.end[V_X]
+    m.v_y = m.end[V_Y]
     for i in range(4):
         m.largest[i] = max(m.largest[i], abs(m.end[i]))
         m.slopes[0, i] = m.slopes[END_STAGE, i]
@@ -278,7 +320,8 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
     m.level += whole
     m.tau = max(tau - whole * interval, 0.0)
     if last == 1:
-        m.level, m.tau = grid.samples, 0.0
+        m.level = grid.samples
+        m.tau = 0.0
     m.time = interval * m.level
     phases.arrive(p, drive)
     m.switches = 0
@@ -300,14 +343,16 @@ def _enter(p: Shoe, which: int, longest: float) -> int:
 @kernel(STEP, inlined=False)
 def step(p: Shoe, drive: Drive, grid: Grid) -> int:
     """Take one step, up to an event at most; a `Failure`."""
-    m, evaluations = p.motion, p.counts.evaluations
+    m = p.motion
+    evaluations = p.counts.evaluations
     t = m.time + m.tau
     to_end = (grid.samples - m.level) * grid.interval - m.tau
     longest = _longest(p, grid.samples * grid.interval)
     limit = min(longest, _to_knot(drive.belt, t), _to_knot(drive.load, t))
     last = 1 if to_end <= limit else 0
     limit = min(limit, to_end)
-    h, growth = min(m.step, limit), _MOST
+    h = min(m.step, limit)
+    growth = _MOST
     while True:
         if h < limit:
             last = 0
@@ -315,7 +360,8 @@ def step(p: Shoe, drive: Drive, grid: Grid) -> int:
         factor = max(_LEAST, min(growth, _SAFETY * error ** (-1.0 / ORDER[m.pair]))) if error > 0.0 else growth
         if error <= 1.0:
             break
-        h, growth = h * factor, 1.0
+        h = h * factor
+        growth = 1.0
         if not h > EPSILON * longest or m.tau + h == m.tau:
             return _STALLED if p.layer.contact.valid == 1 else _NOT_CLOSED
     m.step = max(h * factor, m.step if h == limit else 0.0)
@@ -328,7 +374,8 @@ def step(p: Shoe, drive: Drive, grid: Grid) -> int:
             return _STALLED
         return _enter(p, which, longest)
     if which != NONE:
-        h, last = _to_event(p, which, theta * h), 0
+        h = _to_event(p, which, theta * h)
+        last = 0
         if h == 0.0:
             return _NOT_CLOSED
     _take(p, drive, grid, h, last)

@@ -41,14 +41,19 @@ from brakecli.solver.tangent import renew
 from brakecli.solver.track import enter, mark
 
 STATE = FLOW
-LAG, MEMORY, VELOCITIES = own_steps.LAG, own_steps.MEMORY, own_steps.VELOCITIES
-begin, sample, weighted_time = own_steps.begin, own_steps.sample, own_steps.weighted_time
+LAG = own_steps.LAG
+MEMORY = own_steps.MEMORY
+VELOCITIES = own_steps.VELOCITIES
+begin = own_steps.begin
+sample = own_steps.sample
+weighted_time = own_steps.weighted_time
 mechanical_energy = own_steps.mechanical_energy
 
 _KEPT = 4096  # levels from one sum of the works to the next, so that rounding does not add up
 
 _PLANT = plant_type(FLOW)
-hold, _plant_at = into_memory(_PLANT), from_memory(_PLANT)
+hold = into_memory(_PLANT)
+_plant_at = from_memory(_PLANT)
 _NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
 
 
@@ -64,16 +69,24 @@ def _mark(p: Plant, number: int, t: float) -> None:
     add_works(p.c, m, p.work, p.s.h)
     store = 0.5 * m.stiffness * m.z[Y] * m.z[Y] if m.phase != OPEN else 0.0
     at = mark(p.track, p.work, number, p.grid.samples, t, store)
-    at[0], at[1], at[2], at[3] = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
+    at[0] = m.z[X]
+    at[1] = m.z[Y]
+    at[2] = m.z[V_X]
+    at[3] = m.z[V_Y]
 
 
 @kernel(void(_PLANT, float64), inlined=False)
 def _pass_knot(p: Plant, t: float) -> None:
     """Speed, load and their slopes from a knot on, or from the start; then when the next knot is."""
-    m, belt, load = p.state, p.drive.belt, p.drive.load
-    m.z[BELT], m.z[BELT_SLOPE] = value_at(belt, t), slope_at(belt, t)
-    m.z[LOAD], m.z[LOAD_SLOPE] = value_at(load, t), slope_at(load, t)
-    in_belt, in_load = segment(belt, t) + 1, segment(load, t) + 1
+    m = p.state
+    belt = p.drive.belt
+    load = p.drive.load
+    m.z[BELT] = value_at(belt, t)
+    m.z[BELT_SLOPE] = slope_at(belt, t)
+    m.z[LOAD] = value_at(load, t)
+    m.z[LOAD_SLOPE] = slope_at(load, t)
+    in_belt = segment(belt, t) + 1
+    in_load = segment(load, t) + 1
     m.knot = min(
         belt[in_belt].time if in_belt < belt.size else math.inf,
         load[in_load].time if in_load < load.size else math.inf,
@@ -119,9 +132,13 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
 
     Whole steps go on from an event, so that the motion is beyond the levels that follow, until the next sample.
     """
-    m, h, tau = p.state, p.s.h, p.state.beyond
+    m = p.state
+    h = p.s.h
+    tau = p.state.beyond
     while tau < h:
-        v_x, to_knot, fits = m.z[V_X], m.knot - t - tau, to_sample == 0 or tau == 0.0
+        v_x = m.z[V_X]
+        to_knot = m.knot - t - tau
+        fits = to_sample == 0 or tau == 0.0
         if fits and h < to_knot and min(m.before[4], m.before[5], m.before[6]) >= 0.0 and whole(m, h) == 1:
             _count(m, p.counts)
             if p.tangent.on == 1:
@@ -168,7 +185,10 @@ def _through(p: Plant, t: float, to_sample: int) -> int:
 @kernel(void(_PLANT, float64))
 def _sample(p: Plant, t: float) -> None:
     """Put the sample at the level reached into the state; in stick the shoe is carried along without drift."""
-    m, c, z, belt = p.state, p.c, p.state.z, p.drive.belt
+    m = p.state
+    c = p.c
+    z = p.state.z
+    belt = p.drive.belt
     if m.phase == STICK:
         travel, travel_low = integral_at(belt, t, 0.0)
         z[BELT] = z[V_X] = value_at(belt, t)
@@ -182,19 +202,31 @@ def _sample(p: Plant, t: float) -> None:
         needed += m.needed[i] * z[i]
     holds = m.phase == STICK and abs(needed) <= c.phi * normal * CONE
     state, friction = observed(side_of(m.phase), holds, needed, normal, c.phi * normal)
-    m.row[0], m.row[1], m.row[2], m.row[3] = z[X], z[Y], z[V_X], z[V_Y]
-    m.row[4], m.row[5], m.row[6], m.row[7] = friction, normal, 1.0 if normal > 0.0 else 0.0, state
+    m.row[0] = z[X]
+    m.row[1] = z[Y]
+    m.row[2] = z[V_X]
+    m.row[3] = z[V_Y]
+    m.row[4] = friction
+    m.row[5] = normal
+    m.row[6] = 1.0 if normal > 0.0 else 0.0
+    m.row[7] = state
 
 
 @kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
 def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`."""
     p: Plant = _plant_at(address)
-    m, counts, grid, h, row = p.state, p.counts, p.grid, p.s.h, 0
+    m = p.state
+    counts = p.counts
+    grid = p.grid
+    h = p.s.h
+    row = 0
     if m.started == 0:
         _start(p)
-    last, failure = grid.samples * grid.per_sample, _NONE
-    sampled, part = counts.level // grid.per_sample, counts.level % grid.per_sample
+    last = grid.samples * grid.per_sample
+    failure = _NONE
+    sampled = counts.level // grid.per_sample
+    part = counts.level % grid.per_sample
     while failure == _NONE:
         t = grid.interval * sampled + part * h
         if part == 0:
@@ -224,8 +256,12 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             counts.level += 1
             part += 1
             if part == grid.per_sample:
-                sampled, part = sampled + 1, 0
+                sampled = sampled + 1
+                part = 0
         if failure != _NONE or counts.level % _KEPT == 0 or counts.level == last:
             add_works(p.c, m, p.work, p.s.h)
-    m.x, m.y, m.v_x, m.v_y = m.z[X], m.z[Y], m.z[V_X], m.z[V_Y]
+    m.x = m.z[X]
+    m.y = m.z[Y]
+    m.v_x = m.z[V_X]
+    m.v_y = m.z[V_Y]
     return failure

@@ -19,10 +19,17 @@ _MOST_STEPS = 200  # of a search for a root; halving alone takes 53 from a brack
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64, float64))
 def _value(m: Any, row: int, theta: float) -> tuple[float, float]:
     """A polynomial Σ p_k θ^k and its slope at a part θ of the span."""
-    of, q, value, slope, odd, odd_slope = m.polynomial, theta * theta, 0.0, 0.0, 0.0, 0.0
+    of = m.polynomial
+    q = theta * theta
+    value = 0.0
+    slope = 0.0
+    odd = 0.0
+    odd_slope = 0.0
     for k in range(TERMS - 2, -1, -2):  # even and odd powers apart, which do not wait for each other
-        slope, odd_slope = slope * q + value, odd_slope * q + odd
-        value, odd = value * q + of[row, k], odd * q + of[row, k + 1]
+        slope = slope * q + value
+        odd_slope = odd_slope * q + odd
+        value = value * q + of[row, k]
+        odd = odd * q + of[row, k + 1]
     return value + theta * odd, odd + 2.0 * theta * (slope + theta * odd_slope)
 
 
@@ -52,28 +59,39 @@ def root(m: Any, row: int, left: float, right: float) -> float:
 @kernel(types.UniTuple(float64, 3)(FLOW_TYPE, int64), inlined=False)
 def _follow(m: Any, which: int) -> tuple[float, float, float]:
     """A margin on the series as a polynomial Σ (m z_k) θ^k: its value and slope at the end, and its rounding."""
-    row, z, of = m.margins[m.phase, :, 4 + which], m.series, m.polynomial
-    x, y, v_x, v_y = row[X], row[Y], row[V_X], row[V_Y]
+    row = m.margins[m.phase, :, 4 + which]
+    z = m.series
+    of = m.polynomial
+    x = row[X]
+    y = row[Y]
+    v_x = row[V_X]
+    v_y = row[V_Y]
     for k in range(TERMS):
         of[0, k] = (x * z[k, X] + y * z[k, Y]) + (v_x * z[k, V_X] + v_y * z[k, V_Y])
     of[0, 1] += row[BELT] * z[1, BELT] + row[LOAD] * z[1, LOAD]
-    terms, value, slope = 0.0, 0.0, 0.0
+    terms = 0.0
+    value = 0.0
+    slope = 0.0
     for i in range(SIZE):
         terms += abs(row[i] * z[0, i])
         if i > V_Y:
             of[0, 0] += row[i] * z[0, i]
     for k in range(TERMS - 1, -1, -1):
-        value, slope, terms = value + of[0, k], slope + k * of[0, k], terms + abs(of[0, k])
+        value = value + of[0, k]
+        slope = slope + k * of[0, k]
+        terms = terms + abs(of[0, k])
     return value, slope, ROUNDING * terms
 
 
 @kernel(types.Tuple((int64, float64))(FLOW_TYPE), inlined=False)
 def first_event(m: Any) -> tuple[int, float]:
     """The margin that runs out first on the series, and at which part of the span; 0 if it never was positive."""
-    found, first = NO_EVENT, 1.0
+    found = NO_EVENT
+    first = 1.0
     for which in range(MARGINS if m.phase == STICK else MARGINS - 1):
         last, slope, allowed = _follow(m, which)
-        start, right = m.polynomial[0, 0], 0.0
+        start = m.polynomial[0, 0]
+        right = 0.0
         if start < -allowed:
             return which, 0.0
         if last < -allowed:
@@ -96,5 +114,6 @@ def first_event(m: Any) -> tuple[int, float]:
                 return which, 0.0
         place = root(m, 0, left, right)
         if place < first:
-            found, first = which, place
+            found = which
+            first = place
     return found, first

@@ -48,23 +48,37 @@ def acceleration(m: Any, phase: int, x: float, y: float, v_x: float, v_y: float)
 @kernel(void(FLOW_TYPE, int64, float64), inlined=False)
 def expand(m: Any, phase: int, span: float) -> None:
     """The series of the motion over a span (s), from its first coefficient on: (A span)^k z / k!."""
-    a, z = m.generator, m.series
-    x, y, v_x, v_y, load, belt_slope = z[0, X], z[0, Y], z[0, V_X], z[0, V_Y], z[0, LOAD], z[0, BELT_SLOPE]
+    a = m.generator
+    z = m.series
+    x = z[0, X]
+    y = z[0, Y]
+    v_x = z[0, V_X]
+    v_y = z[0, V_Y]
+    load = z[0, LOAD]
+    belt_slope = z[0, BELT_SLOPE]
     z[1, BELT], z[1, LOAD] = span * z[0, BELT_SLOPE], span * z[0, LOAD_SLOPE]  # further terms are 0
     for k in range(1, TERMS):
         part = span / k
         a_x, a_y = acceleration(m, phase, x, y, v_x, v_y)
         a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
         a_y += a[phase, V_Y, LOAD] * load
-        x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-        load, belt_slope = z[1, LOAD] if k == 1 else 0.0, 0.0
-        z[k, X], z[k, Y], z[k, V_X], z[k, V_Y] = x, y, v_x, v_y
+        x = part * v_x
+        y = part * v_y
+        v_x = part * a_x
+        v_y = part * a_y
+        load = z[1, LOAD] if k == 1 else 0.0
+        belt_slope = 0.0
+        z[k, X] = x
+        z[k, Y] = y
+        z[k, V_X] = v_x
+        z[k, V_Y] = v_y
 
 
 @kernel(void(FLOW_TYPE, float64))
 def reach(m: Any, theta: float) -> None:
     """Put the motion at a part of the span of the series, Σ z_k θ^k, into `m.at`."""
-    z, q = m.series, theta * theta
+    z = m.series
+    q = theta * theta
     for i in range(SIZE):  # the compiler makes one vector of them
         value = 0.0
         for k in range(TERMS - 2, -1, -2):  # in pairs, which wait for each other half as long
@@ -75,29 +89,46 @@ def reach(m: Any, theta: float) -> None:
 @kernel(void(COEFFICIENTS, FLOW_TYPE, int64), inlined=False)
 def _describe(c: Coefficients, m: Any, phase: int) -> None:
     """The generator of a phase, its friction force and margins."""
-    a, force, needed, margin = m.generator[phase], m.friction[phase], m.needed, m.margins[phase, :, 4:]
+    a = m.generator[phase]
+    force = m.friction[phase]
+    needed = m.needed
+    margin = m.margins[phase, :, 4:]
     pressed = m.stiffness if phase != OPEN else 0.0  # F_y = -pressed y, Eq. (2)
     side = side_of(phase)
     for j in range(4):
         m.margins[phase, j, j] = 1.0
     # Eq. (6) with the velocity and the acceleration of the wheel
-    needed[X], needed[Y], needed[V_Y], needed[LOAD] = c.c_xx, c.c_xy, c.b_xy, c.sin_beta
-    needed[BELT], needed[BELT_SLOPE] = c.b_xx, c.m
+    needed[X] = c.c_xx
+    needed[Y] = c.c_xy
+    needed[V_Y] = c.b_xy
+    needed[LOAD] = c.sin_beta
+    needed[BELT] = c.b_xx
+    needed[BELT_SLOPE] = c.m
     a[X, V_X] = a[Y, V_Y] = a[BELT, BELT_SLOPE] = a[LOAD, LOAD_SLOPE] = 1.0
-    a[V_Y, X], a[V_Y, Y], a[V_Y, LOAD] = -c.c_xy / c.m, -(c.c_yy + pressed) / c.m, -c.cos_beta / c.m  # Eq. (7)
-    a[V_Y, V_X], a[V_Y, V_Y] = -c.b_xy / c.m, -c.b_yy / c.m
+    # Eq. (7)
+    a[V_Y, X] = -c.c_xy / c.m
+    a[V_Y, Y] = -(c.c_yy + pressed) / c.m
+    a[V_Y, LOAD] = -c.cos_beta / c.m
+    a[V_Y, V_X] = -c.b_xy / c.m
+    a[V_Y, V_Y] = -c.b_yy / c.m
     margin[Y, HEIGHT] = 1.0 if phase == OPEN else -1.0
     if phase == STICK:
         a[V_X, BELT_SLOPE] = 1.0
         for j in range(SIZE):
             force[j] = needed[j]  # Eq. (4)
-            margin[j, PULL], margin[j, PUSH] = -needed[j], needed[j]
+            margin[j, PULL] = -needed[j]
+            margin[j, PUSH] = needed[j]
         margin[Y, PULL], margin[Y, PUSH] = margin[Y, PULL] - c.phi * pressed, margin[Y, PUSH] - c.phi * pressed
     else:
         force[Y] = side * c.phi * pressed  # Eq. (5)
-        a[V_X, X], a[V_X, Y], a[V_X, LOAD] = -c.c_xx / c.m, (force[Y] - c.c_xy) / c.m, -c.sin_beta / c.m  # Eq. (6)
-        a[V_X, V_X], a[V_X, V_Y] = -c.b_xx / c.m, -c.b_xy / c.m
-        margin[V_X, SLIDING], margin[BELT, SLIDING] = side, -side
+        # Eq. (6)
+        a[V_X, X] = -c.c_xx / c.m
+        a[V_X, Y] = (force[Y] - c.c_xy) / c.m
+        a[V_X, LOAD] = -c.sin_beta / c.m
+        a[V_X, V_X] = -c.b_xx / c.m
+        a[V_X, V_Y] = -c.b_xy / c.m
+        margin[V_X, SLIDING] = side
+        margin[BELT, SLIDING] = -side
 
 
 @kernel(void(FLOW_TYPE, int64, float64), inlined=False)
@@ -106,22 +137,44 @@ def _unroll(m: Any, phase: int, h: float) -> None:
 
     Two terms in one loop make it large enough for the compiler to take vectors; a short one it unrolls instead.
     """
-    a, f = m.generator, m.flow
+    a = m.generator
+    f = m.flow
     for i in range(4):
         for j in range(SIZE):
-            f[0, i, j], f[1, i, j] = 1.0 if i == j else 0.0, h * a[phase, i, j]
-    xx, xy, xu, xv = a[phase, V_X, X], a[phase, V_X, Y], a[phase, V_X, V_X], a[phase, V_X, V_Y]
-    yx, yy, yu, yv = a[phase, V_Y, X], a[phase, V_Y, Y], a[phase, V_Y, V_X], a[phase, V_Y, V_Y]
+            f[0, i, j] = 1.0 if i == j else 0.0
+            f[1, i, j] = h * a[phase, i, j]
+    xx = a[phase, V_X, X]
+    xy = a[phase, V_X, Y]
+    xu = a[phase, V_X, V_X]
+    xv = a[phase, V_X, V_Y]
+    yx = a[phase, V_Y, X]
+    yy = a[phase, V_Y, Y]
+    yu = a[phase, V_Y, V_X]
+    yv = a[phase, V_Y, V_Y]
     for k in range(2, TERMS, 2):
-        part, then = h / k, h / (k + 1)
+        part = h / k
+        then = h / (k + 1)
         for j in range(SIZE):
-            x, y, v_x, v_y = f[k - 1, X, j], f[k - 1, Y, j], f[k - 1, V_X, j], f[k - 1, V_Y, j]
-            a_x, a_y = (xx * x + xy * y) + (xu * v_x + xv * v_y), (yx * x + yy * y) + (yu * v_x + yv * v_y)
-            x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-            f[k, X, j], f[k, Y, j], f[k, V_X, j], f[k, V_Y, j] = x, y, v_x, v_y
-            a_x, a_y = (xx * x + xy * y) + (xu * v_x + xv * v_y), (yx * x + yy * y) + (yu * v_x + yv * v_y)
-            f[k + 1, X, j], f[k + 1, Y, j] = then * v_x, then * v_y
-            f[k + 1, V_X, j], f[k + 1, V_Y, j] = then * a_x, then * a_y
+            x = f[k - 1, X, j]
+            y = f[k - 1, Y, j]
+            v_x = f[k - 1, V_X, j]
+            v_y = f[k - 1, V_Y, j]
+            a_x = (xx * x + xy * y) + (xu * v_x + xv * v_y)
+            a_y = (yx * x + yy * y) + (yu * v_x + yv * v_y)
+            x = part * v_x
+            y = part * v_y
+            v_x = part * a_x
+            v_y = part * a_y
+            f[k, X, j] = x
+            f[k, Y, j] = y
+            f[k, V_X, j] = v_x
+            f[k, V_Y, j] = v_y
+            a_x = (xx * x + xy * y) + (xu * v_x + xv * v_y)
+            a_y = (yx * x + yy * y) + (yu * v_x + yv * v_y)
+            f[k + 1, X, j] = then * v_x
+            f[k + 1, Y, j] = then * v_y
+            f[k + 1, V_X, j] = then * a_x
+            f[k + 1, V_Y, j] = then * a_y
     for k in range(1, TERMS):  # a slope of Q is followed as Q is, and added up over time
         for i in range(4):
             f[k, i, LOAD_SLOPE] = h / k * f[k - 1, i, LOAD]
@@ -157,7 +210,10 @@ def make(c: Coefficients, m: Any, phase: int, h: float) -> None:
         return
     m.made[phase] = 1
     _describe(c, m, phase)
-    a, margins, step, rows = m.generator[phase], m.margins[phase], m.step[phase], m.rows
+    a = m.generator[phase]
+    margins = m.margins[phase]
+    step = m.step[phase]
+    rows = m.rows
     for k in range(4, 4 + MARGINS):
         for j in range(SIZE):
             slope = 0.0
@@ -182,20 +238,33 @@ def _make_works(c: Coefficients, m: Any, phase: int, h: float) -> None:
     They are the integrals of F_x U, F_x (U - ẋ), ẋ b_xx ẋ + 2 ẋ b_xy ẏ + ẏ b_yy ẏ, and Q_x ẋ + Q_y ẏ.
     """
     m.made[phase] = 2
-    r, pull, v_x, v_y, along, across = m.rows, m.factors[0], m.factors[1], m.factors[2], m.factors[3], m.factors[4]
-    slides, w = 0.0 if phase == STICK else 1.0, m.works[phase]
+    r = m.rows
+    pull = m.factors[0]
+    v_x = m.factors[1]
+    v_y = m.factors[2]
+    along = m.factors[3]
+    across = m.factors[4]
+    slides = 0.0 if phase == STICK else 1.0
+    w = m.works[phase]
     _unroll(m, phase, h)
     for n in range(NODES):
         _sum_up(m, n)
-        share, time = h * _SHARES[n], h * _NODES[n]
+        share = h * _SHARES[n]
+        time = h * _NODES[n]
         for j in range(SIZE):
-            force, rates = _driven(m.friction[phase], j, time), _rates(c, r[V_X, j], r[V_Y, j])
+            force = _driven(m.friction[phase], j, time)
+            rates = _rates(c, r[V_X, j], r[V_Y, j])
             for i in range(4):
                 force += m.friction[phase, i] * r[i, j]
-            pull[n, j], v_x[n, j], v_y[n, j] = share * force, r[V_X, j], r[V_Y, j]
-            along[n, j], across[n, j] = share * rates[0], share * rates[1]
+            pull[n, j] = share * force
+            v_x[n, j] = r[V_X, j]
+            v_y[n, j] = r[V_Y, j]
+            along[n, j] = share * rates[0]
+            across[n, j] = share * rates[1]
             for k in range(2):
-                u, q, part = max(j, BELT + k), max(j, LOAD + k), time if k == 1 else 1.0
+                u = max(j, BELT + k)
+                q = max(j, LOAD + k)
+                part = time if k == 1 else 1.0
                 w[0, u, j + BELT + k - u] += part * pull[n, j]
                 w[3, q, j + LOAD + k - q] += part * share * rates[2]
     for i in range(SIZE):
@@ -214,7 +283,9 @@ def take_part(c: Coefficients, m: Any, work: Any, span: float, theta: float) -> 
     z = m.at
     for node in range(NODES):
         reach(m, theta * _NODES[node])
-        share, force, rates = theta * span * _SHARES[node], 0.0, _rates(c, z[V_X], z[V_Y])
+        share = theta * span * _SHARES[node]
+        force = 0.0
+        rates = _rates(c, z[V_X], z[V_Y])
         for i in range(SIZE):
             force += m.friction[m.phase, i] * z[i]
         work.belt += share * force * z[BELT]
@@ -233,13 +304,23 @@ def add_works(c: Coefficients, m: Any, work: Any, h: float) -> None:
         return
     if m.made[m.phase] < 2:
         _make_works(c, m, m.phase, h)
-    works, sums, belt, heat, dashpots, load, pair = m.works[m.phase], m.sums, 0.0, 0.0, 0.0, 0.0, 0
+    works = m.works[m.phase]
+    sums = m.sums
+    belt = 0.0
+    heat = 0.0
+    dashpots = 0.0
+    load = 0.0
+    pair = 0
     for i in range(SIZE):
         for j in range(i + 1):
-            belt, heat = belt + works[0, i, j] * sums[pair], heat + works[1, i, j] * sums[pair]
-            dashpots, load = dashpots + works[2, i, j] * sums[pair], load + works[3, i, j] * sums[pair]
+            belt = belt + works[0, i, j] * sums[pair]
+            heat = heat + works[1, i, j] * sums[pair]
+            dashpots = dashpots + works[2, i, j] * sums[pair]
+            load = load + works[3, i, j] * sums[pair]
             sums[pair] = 0.0
             pair += 1
     m.waiting = 0
-    work.belt, work.friction = work.belt + belt, work.friction + heat
-    work.dashpots, work.load = work.dashpots + dashpots, work.load + load
+    work.belt = work.belt + belt
+    work.friction = work.friction + heat
+    work.dashpots = work.dashpots + dashpots
+    work.load = work.load + load

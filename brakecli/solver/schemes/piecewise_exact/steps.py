@@ -38,18 +38,34 @@ _FOUR = types.UniTuple(float64, 4)
 @kernel(void(FLOW_TYPE))
 def _ahead(m: Any) -> None:
     """The matrix of a step times the motion, Σ now_ik z_i, in `after`; a tree of sums has less latency."""
-    a, z = m.now, m.z
-    z_0, z_1, z_2, z_3, z_4, z_5, z_6, z_7 = z[0], z[1], z[2], z[3], z[4], z[5], z[6], z[7]
+    a = m.now
+    z = m.z
+    z_0 = z[0]
+    z_1 = z[1]
+    z_2 = z[2]
+    z_3 = z[3]
+    z_4 = z[4]
+    z_5 = z[5]
+    z_6 = z[6]
+    z_7 = z[7]
     for k in range(AHEAD):
-        one, two = a[0, k] * z_0 + a[1, k] * z_1, a[2, k] * z_2 + a[3, k] * z_3
-        three, four = a[4, k] * z_4 + a[5, k] * z_5, a[6, k] * z_6 + a[7, k] * z_7
+        one = a[0, k] * z_0 + a[1, k] * z_1
+        two = a[2, k] * z_2 + a[3, k] * z_3
+        three = a[4, k] * z_4 + a[5, k] * z_5
+        four = a[6, k] * z_6 + a[7, k] * z_7
         m.after[k] = (one + two) + (three + four)
 
 
 @kernel(void(FLOW_TYPE))
 def _round(m: Any) -> None:
     """Add a bound of the rounding of a step to the error, ε Σ |z_i now_ik|, with the signs that do most harm."""
-    a, x, y, v_x, v_y, belt, load = m.now, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y], m.z[BELT], m.z[LOAD]
+    a = m.now
+    x = m.z[X]
+    y = m.z[Y]
+    v_x = m.z[V_X]
+    v_y = m.z[V_Y]
+    belt = m.z[BELT]
+    load = m.z[LOAD]
     for i in range(4):
         place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
         drive = abs(a[BELT, i] * belt) + abs(a[LOAD, i] * load)
@@ -59,7 +75,11 @@ def _round(m: Any) -> None:
 @kernel(void(FLOW_TYPE))
 def _carry(m: Any) -> None:
     """Move the error along a whole step, which has a rounding error of its own."""
-    a, x, y, v_x, v_y = m.now, m.error[X], m.error[Y], m.error[V_X], m.error[V_Y]
+    a = m.now
+    x = m.error[X]
+    y = m.error[Y]
+    v_x = m.error[V_X]
+    v_y = m.error[V_Y]
     for i in range(4):
         m.error[i] = (a[0, i] * x + a[1, i] * y) + (a[2, i] * v_x + a[3, i] * v_y)
     _round(m)
@@ -74,7 +94,8 @@ def whole(m: Any, h: float) -> int:
     """
     _ahead(m)
     for k in range(4, 4 + MARGINS):
-        fall, rise = m.before[MARGINS + k], m.after[MARGINS + k]
+        fall = m.before[MARGINS + k]
+        rise = m.after[MARGINS + k]
         if m.after[k] < 0.0 or (fall < -_FLAT * rise < 0.0 and fall * m.after[k] > rise * (m.before[k] + fall)):
             return 0
     pair = 0
@@ -95,7 +116,11 @@ def whole(m: Any, h: float) -> int:
 @kernel(void(FLOW_TYPE, TANGENT_TYPE), inlined=False)
 def disturb(m: Any, t: Any) -> None:
     """Move the disturbance along a whole step."""
-    a, x, y, v_x, v_y = m.now, t.x, t.y, t.v_x, t.v_y
+    a = m.now
+    x = t.x
+    y = t.y
+    v_x = t.v_x
+    v_y = t.v_y
     t.x = (a[0, 0] * x + a[1, 0] * y) + (a[2, 0] * v_x + a[3, 0] * v_y)
     t.y = (a[0, 1] * x + a[1, 1] * y) + (a[2, 1] * v_x + a[3, 1] * v_y)
     t.v_x = (a[0, 2] * x + a[1, 2] * y) + (a[2, 2] * v_x + a[3, 2] * v_y)
@@ -105,12 +130,22 @@ def disturb(m: Any, t: Any) -> None:
 @kernel(_FOUR(FLOW_TYPE, float64, *_FOUR), inlined=False)
 def _moved(m: Any, seconds: float, x: float, y: float, v_x: float, v_y: float) -> Four:
     """A disturbance after a part of a step in the present phase: Σ (A s)^k z/k!, s in seconds."""
-    phase, moved_x, moved_y, moved_v_x, moved_v_y = m.phase, x, y, v_x, v_y
+    phase = m.phase
+    moved_x = x
+    moved_y = y
+    moved_v_x = v_x
+    moved_v_y = v_y
     for k in range(1, _ERROR_TERMS):
         a_x, a_y = acceleration(m, phase, x, y, v_x, v_y)
         part = seconds / k
-        x, y, v_x, v_y = part * v_x, part * v_y, part * a_x, part * a_y
-        moved_x, moved_y, moved_v_x, moved_v_y = moved_x + x, moved_y + y, moved_v_x + v_x, moved_v_y + v_y
+        x = part * v_x
+        y = part * v_y
+        v_x = part * a_x
+        v_y = part * a_y
+        moved_x = moved_x + x
+        moved_y = moved_y + y
+        moved_v_x = moved_v_x + v_x
+        moved_v_y = moved_v_y + v_y
     return moved_x, moved_y, moved_v_x, moved_v_y
 
 
@@ -139,24 +174,43 @@ def note_turn(m: Any, track: Any, t: float, span: float, v_before: float) -> Non
 
     Chebyshev's iteration from the secant on, on the series from the end back: mostly the series is needed once.
     """
-    a, z, phase, kind = m.generator, m.z, m.phase, turned(track, m.z[V_X])
+    a = m.generator
+    z = m.z
+    phase = m.phase
+    kind = turned(track, m.z[V_X])
     if kind < 0:
         return
     back = -span * z[V_X] / (z[V_X] - v_before) if z[V_X] * v_before <= 0.0 else 0.0
     place = 0.0
     for _ in range(_CORRECTED):
-        x, y, v_x, v_y, load, belt_slope = z[X], z[Y], z[V_X], z[V_Y], z[LOAD], z[BELT_SLOPE]
-        velocity, slope, bend, power, before = v_x, 0.0, 0.0, 1.0, 0.0
+        x = z[X]
+        y = z[Y]
+        v_x = z[V_X]
+        v_y = z[V_Y]
+        load = z[LOAD]
+        belt_slope = z[BELT_SLOPE]
+        velocity = v_x
+        slope = 0.0
+        bend = 0.0
+        power = 1.0
+        before = 0.0
         place = x
         for k in range(1, _ERROR_TERMS):
             a_x, a_y = acceleration(m, phase, x, y, v_x, v_y)
             a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
             a_y += a[phase, V_Y, LOAD] * load
-            x, y, v_x, v_y = v_x, v_y, a_x, a_y
-            load, belt_slope = z[LOAD_SLOPE] if k == 1 else 0.0, 0.0
-            slope, bend = slope + power * v_x, bend + before * v_x
-            before, power = power, power * (back / k)
-            place, velocity = place + power * x, velocity + power * v_x
+            x = v_x
+            y = v_y
+            v_x = a_x
+            v_y = a_y
+            load = z[LOAD_SLOPE] if k == 1 else 0.0
+            belt_slope = 0.0
+            slope = slope + power * v_x
+            bend = bend + before * v_x
+            before = power
+            power = power * (back / k)
+            place = place + power * x
+            velocity = velocity + power * v_x
         rest = -velocity / slope if abs(velocity) < span * abs(slope) else 0.0
         rest -= 0.5 * bend * rest * rest / slope if rest != 0.0 else 0.0
         rest = min(max(rest, -span - back), -back)

@@ -15,10 +15,12 @@ from brakecli.solver.schemes.piecewise_exact.locate import ROUNDING
 @kernel(types.UniTuple(float64, 2)(FLOW_TYPE, int64))
 def _margin(m: Any, which: int) -> tuple[float, float]:
     """A margin in stick (N), its column times z, and by how much it may miss zero through rounding."""
-    total, terms = 0.0, 0.0
+    total = 0.0
+    terms = 0.0
     for i in range(SIZE):
         part = m.margins[STICK, i, 4 + which] * m.z[i]
-        total, terms = total + part, terms + abs(part)
+        total = total + part
+        terms = terms + abs(part)
     return total, 0.5 * ROUNDING * terms
 
 
@@ -31,7 +33,8 @@ def _enter(c: Coefficients, m: Any, phase: int, h: float) -> None:
     if phase == UNDECIDED:
         phases.make(c, m, STICK, h)
         m.z[V_X] = m.z[BELT]
-        (pull, its_rounding), (push, rounding) = _margin(m, PULL), _margin(m, PUSH)
+        pull, its_rounding = _margin(m, PULL)
+        push, rounding = _margin(m, PUSH)
         phase = held(pull, push, its_rounding, rounding)
     m.phase = phase
     phases.make(c, m, phase, h)
@@ -45,10 +48,12 @@ def _rises(c: Coefficients, m: Any, h: float) -> bool:
         m.series[0, i] = m.z[i]
     phases.expand(m, OPEN, h)
     for k in range(TERMS):
-        total, terms = 0.0, 0.0
+        total = 0.0
+        terms = 0.0
         for i in range(SIZE):
             part = m.generator[OPEN, V_Y, i] * m.series[k, i] if i < BELT or k < 2 else 0.0
-            total, terms = total + part, terms + abs(part)
+            total = total + part
+            terms = terms + abs(part)
         if abs(total) > ROUNDING * terms:
             return total > 0.0
     return False
