@@ -12,9 +12,9 @@ _GIVEN = "found nan", "found inf"  # of a user, as a message repeats it
 
 
 def unknown_in(value: Any) -> list[str]:
-    """The texts in a value that hold nan or inf."""
+    """The sentences in a value that hold nan or inf; a word alone, such as a unit in a forged file, is none."""
     texts = value if isinstance(value, list | tuple) else [value]
-    said = [text for text in texts if isinstance(text, str) and _UNKNOWN.search(text)]
+    said = [text for text in texts if isinstance(text, str) and " " in text and _UNKNOWN.search(text)]
     return [text for text in said if not any(given in text for given in _GIVEN)]
 
 
