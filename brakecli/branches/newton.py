@@ -49,7 +49,8 @@ class Settings:
     near: float = 1e-5
     """Correction that is the last one; the error left is of the order of its square.
 
-    Multipliers and facts are those of the place before it. Of a motion smaller than one it is such a part.
+    Multipliers and facts are those of the place before it. Facts of a motion so small that the correction is no
+    such part of it are those of the last place.
     """
     exact: float = 1e-9
     """Correction that is the last one where a special point is located."""
@@ -111,6 +112,7 @@ class Newton:
         """
         settings = self.settings
         self.seen = self.outside = None
+        near = settings.exact if exact else settings.near
         n = len(guess) - 1
         matrix = np.empty((n + 1, n + 1))
         right = np.zeros((n + 1, 2))
@@ -148,7 +150,6 @@ class Newton:
             right[n, 0] = normal @ (guess - z)
             step, tangent, length = self._solution(matrix, right)
             size = float(np.abs(step).max())
-            near = settings.exact if exact else max(settings.near * min(seen.size, 1.0), settings.exact)
             if not size <= settings.trust or not length < math.inf:
                 break
             # rounding of the gap may keep corrections from becoming still smaller
@@ -171,7 +172,10 @@ class Newton:
                 step, tangent, length = self._solution(matrix, right)
                 if not length < math.inf:
                     break
-            return self._point(z + step, tangent / length, length, matrix, onward, s, seen)
+            z = z + step
+            if size > settings.near * seen.size and (reached := self.evaluate(z, False)) is not None:
+                seen = seen._replace(facts=reached.facts)
+            return self._point(z, tangent / length, length, matrix, onward, s, seen)
         self.why = "Newton's method does not converge"
         return None
 
