@@ -71,8 +71,11 @@ def friction_gives_most(a: Answers, t: Thresholds) -> bool:
 
 
 def friction_gives_less(a: Answers, t: Thresholds) -> bool:
-    """Nothing shows that friction gives most of the energy, by an account that balances."""
-    return balances(a, t) and _excess_of_friction(a, t) <= _error_of_friction(a, t)
+    """Nothing shows that friction gives most of the energy, and no energy comes from elsewhere.
+
+    Powers balance, or dashpots take more than both give: what falls so is kept up by nothing.
+    """
+    return (balances(a, t) or a.power_left < 0.0) and not friction_gives_most(a, t)
 
 
 def roughness_is_idle(a: Answers, t: Thresholds) -> bool:
