@@ -15,6 +15,7 @@ from brakecli.branches.line import Line
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.errors import CaseError
+from brakecli.solver.roots import bracketed_root
 from brakecli.solver.steady_sliding import PRESSED, steady_sliding, tabulated
 
 PLACES = 65
@@ -171,10 +172,7 @@ class Sliding:
 
     def _zero(self, test: int, low: float, high: float) -> tuple[float, float]:
         """Where a test passes zero between two places, and half the width of its bracket."""
-        from scipy.optimize import brentq
-
-        p = brentq(lambda p: self.at(p).tests[test], low, high, xtol=LOCATED, rtol=4.0 * math.ulp(1.0))
-        return float(p), LOCATED
+        return bracketed_root(lambda p: self.at(p).tests[test], low, high, absolute=LOCATED), LOCATED
 
     def _rises(self, p: float, y: float) -> float:
         """How far (m) the shoe may rise from a height y (m) until the stiffness of the contact changes."""

@@ -3,7 +3,7 @@
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
-from brakecli.branches.bar import WIDEST, Bound, located
+from brakecli.branches.bar import Bound, located
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.told import Followed
 
@@ -84,14 +84,14 @@ def _bound(followed: Followed, k: int, way: int) -> Bound:
 
 
 def told_apart(bounds: list[Bound]) -> list[Bound]:
-    """The bounds in order, with their bars, without pairs that are closer than these, of which one is wide.
+    """The bounds in order, with their bars, without pairs that are closer than either bar.
 
     An interval that is so narrow may be none; so may what lies between two.
     """
     bounds = [bound._replace(error=bound.bar, inner=None) for bound in bounds]
     for k, (one, other) in enumerate(pairwise(bounds)):
         bars = one.error, other.error
-        if one.known and other.known and max(bars) >= WIDEST and other.p - one.p < min(bars):
+        if one.known and other.known and other.p - one.p < min(bars):
             return told_apart([*bounds[:k], *bounds[k + 2 :]])
     return bounds
 

@@ -97,12 +97,18 @@ class OutputFile(FileIO):
                 action()
 
 
+def led_to(path: Path) -> Path:
+    """The file that a path stands for: that to which a symbolic link leads, also in a directory that is gone."""
+    is_link = os.path.islink(path)  # noqa: PTH114 - pathlib's may raise
+    return Path(os.path.realpath(path)) if is_link else path
+
+
 def check_target(target: Path, what: str, suffixes: Sequence[str], results: Iterable[Path] = ()) -> None:
     """Raise UsageError where a target has the suffix of nothing that can be written, or is one of the results.
 
     The same holds for the file that a symbolic link leads to.
     """
-    ends = [suffix for name in (target, os.path.realpath(target)) for suffix in [Path(name).suffix]]
+    ends = [name.suffix for name in (target, led_to(target))]
     if wrong := [suffix for suffix in ends if suffix.lower() not in suffixes]:
         problem = f"its suffix does not name {what} (found {wrong[0]!r})"
         named = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))

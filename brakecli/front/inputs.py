@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
 from brakecli.faces import argument, command
-from brakecli.files.atomic import refuse_source
+from brakecli.files.atomic import led_to, refuse_source
 from brakecli.files.opening import is_hdf5
 
 if TYPE_CHECKING:
@@ -112,7 +112,7 @@ def result_path(output: Path | None, source: str, kind: str = "case", ending: st
     target = output or Path((kind if source == "-" else Path(source).stem) + ending)
     if source != "-" and not is_result(source):
         refuse_source(target, source, kind)
-    suffix = Path(os.path.realpath(target)).suffix  # of a symbolic link that of the file that it leads to
+    suffix = led_to(target).suffix
     if suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
         raise UsageError(
             f"{target}: a result is HDF5, not {suffix}; name a file that ends in .h5 with {argument('output')}"

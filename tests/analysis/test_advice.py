@@ -327,7 +327,9 @@ def test_open_pads_rest_on_the_mean_stiffness_and_lists_are_scaled_as_a_whole() 
     assert moved.critical is not None
     assert report.critical_friction is not None
     part = math.log(moved.critical / report.critical_friction) / math.log(1.1)
-    assert given.elasticity == pytest.approx(part, rel=0.1)  # over a tenth the curve bends
+    assert given.error is not None
+    bend = 0.1 * part  # of the curve, over a tenth of the amplitudes
+    assert abs(given.elasticity - part) <= given.error + bend
     best = report.advice[0]
     assert best.to is not None
     there = changed(case, tuple(best.parameter.split(".")), best.to)

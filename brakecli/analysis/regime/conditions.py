@@ -80,14 +80,17 @@ def friction_gives_less(a: Answers, t: Thresholds) -> bool:
 
 def roughness_is_idle(a: Answers, t: Thresholds) -> bool:
     """The waves neither give energy nor take it, but for a part that is lost in a settled level."""
-    error = t.sure_errors * math.hypot(a.roughness_error, t.settled_within * a.friction_error) + abs(a.power_left)
-    return abs(a.power_of_roughness) + error < t.settled_within * a.power_of_friction
+    error = t.sure_errors * math.hypot(a.roughness_error, t.settled_within * a.friction_error)
+    lost = t.settled_within * (a.power_of_friction - abs(a.power_left))
+    return abs(a.power_of_roughness) + error < lost
 
 
 def roughness_gives_most(a: Answers, t: Thresholds) -> bool:
     """The waves give most of the energy, also of what is stored or set free."""
-    error = t.sure_errors * math.hypot(a.roughness_error, t.most * a.friction_error) + t.most * abs(a.power_left)
-    return a.power_of_roughness - t.most * max(a.power_of_friction, 0.0) > error
+    error = t.sure_errors * a.roughness_error
+    other = t.most * _may_give(a.power_of_friction, t.sure_errors * a.friction_error)
+    excess = a.power_of_roughness - t.most * max(a.power_of_friction, 0.0)
+    return excess > math.hypot(error, other) + t.most * abs(a.power_left)
 
 
 def _excess_of_friction(a: Answers, t: Thresholds) -> float:
@@ -97,7 +100,13 @@ def _excess_of_friction(a: Answers, t: Thresholds) -> float:
 
 def _error_of_friction(a: Answers, t: Thresholds) -> float:
     """How far that may be off."""
-    return t.sure_errors * math.hypot(a.friction_error, t.most * a.roughness_error)
+    other = t.most * _may_give(a.power_of_roughness, t.sure_errors * a.roughness_error)
+    return math.hypot(t.sure_errors * a.friction_error, other)
+
+
+def _may_give(power: float, error: float) -> float:
+    """Power (W) that one may give beyond what it is found to give: none where it surely takes."""
+    return max(power + error, 0.0) - max(power, 0.0)
 
 
 def balances(a: Answers, t: Thresholds) -> bool:

@@ -23,6 +23,7 @@ from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.records import Coefficients
+from brakecli.solver.roots import bracketed_root
 from brakecli.solver.steady_sliding import (
     UNPRESSED,
     WINDOWS,
@@ -283,7 +284,6 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
 
     It is looked for up to twice the exact value.
     """
-    from scipy.optimize import brentq  # only `brakecli stability` and sweeps wait for it
 
     def excess(phi: float) -> float:
         return spectral_radius(system, stiffness_at(phi), phi) - 1.0 - MARGIN
@@ -293,7 +293,7 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
     highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
     for low, high in pairwise(np.linspace(0.0, highest, FRICTIONS).tolist()):
         if excess(high) > 0.0:
-            return float(brentq(excess, low, high, xtol=_LOCATED))
+            return bracketed_root(excess, low, high, absolute=_LOCATED)
     return None
 
 
