@@ -16,7 +16,7 @@ PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
 INSTALL := $(PIP) install --no-compile --editable
 unexport PYTHONDONTWRITEBYTECODE
 CASES := $(sort $(wildcard cases/*.toml))
-# Two processes compile the kernels from both ends. PYTEST_ARGS=-n0 takes one alone.
+# PYTEST_ARGS=-n0 takes one process alone.
 PYTEST := -m pytest --numprocesses 2 --dist loadfile
 PYTEST_ARGS ?=
 BENCH_ARGS ?=
@@ -89,10 +89,15 @@ demo: $(RUN_STAMP) ## install into .venv and run one real case, cases/relaxation
 	@echo "  xarray.open_dataset('results/relaxation.h5', group='history', engine='h5netcdf')"
 	@echo "Next: change a value, as in  $(BIN)/brakecli run cases/relaxation.toml --set friction.coefficient=0.5 -o results/mine.h5"
 
+# Compiles all kernels, once, and says so: the tests would wait for them in silence.
+KERNELS := $(BIN)/brakecli check cases/relaxation.toml >/dev/null
+
 test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
+	@$(KERNELS)
 	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
 campaign: $(DEV_STAMP) docs ## run long tests and statistics, of most of which make test has a smaller part (25 minutes)
+	@$(KERNELS)
 	$(BIN)/python $(PYTEST) -n3 -m campaign $(PYTEST_ARGS) # one more, as many of these wait for seconds
 
 lowest: $(LOWEST_STAMP) ## run the tests with every dependency at the lowest version that pyproject.toml declares

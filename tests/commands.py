@@ -48,6 +48,11 @@ output.sample_interval = 1e-4
 """
 
 
+def lazily(cache: str | Path) -> dict[str, Any]:
+    """Variables for a command that has a cache of its own, in which it compiles what it needs alone."""
+    return {"XDG_CACHE_HOME": str(cache), "BRAKECLI_COMPILE": "lazy"}
+
+
 def environment(**changes: str | None) -> dict[str, str]:
     """The tests' own environment without anything that changes how output looks; None takes a variable out."""
     names = "PATH", "HOME", "XDG_CACHE_HOME", "OPENBLAS_CORETYPE"  # the last decides how eigenvalues are rounded

@@ -27,8 +27,6 @@ LOCATED = 1e-7
 """Change of p below which it is located."""
 NOT_ZERO = 1e-12
 """Least size of a logarithm of a multiplier, so that it has the sign that the verdict on stability has."""
-WIDEST = 1.0 / 3.0
-"""Part of the range that an error bar with an answer may have."""
 
 
 class Bound(NamedTuple):

@@ -18,7 +18,7 @@ from brakecli.errors import BrakecliError, Problem
 from brakecli.solver.contact import EVALUATORS
 
 if TYPE_CHECKING:
-    from brakecli.solver.records import Coefficients
+    from brakecli.solver.coefficients import Coefficients
 
 PROFILE_ERROR = 0.01
 """Part of the RMS of a measured profile that its sines leave out, where a case leaves it open."""

@@ -14,7 +14,7 @@ import typer
 
 from brakecli.about import __released__, __version__
 from brakecli.cli.options import option
-from brakecli.cli.output import announce_compilation, show, warn
+from brakecli.cli.output import announce_compilation, show, showing_compilation, warn
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.faces import as_argument
 from brakecli.files.trust import readings
@@ -106,6 +106,7 @@ def _common(
     context: typer.Context, version: Annotated[bool, VERSION] = False, cite: Annotated[bool, CITE] = False
 ) -> None:
     compiling.set_notice(announce_compilation)
+    compiling.set_progress(showing_compilation)
     readings.begin(warn)
     context.call_on_close(readings.begin)  # a later call of the same process forgets what this one has read
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)

@@ -36,6 +36,7 @@ AsJson = Annotated[bool, option("Print one JSON object on standard output, nothi
 def _compile_in_silence(quiet: bool) -> bool:
     if quiet:
         compiling.set_notice(lambda trouble: warn(*filter(None, [trouble])))
+        compiling.set_progress(None)
     return quiet
 
 

@@ -2,12 +2,13 @@
 
 import json
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from typing import Any
 
 from brakecli.files.os_signals import Styled
 from brakecli.files.trust import readings
-from brakecli.front.progress import say
+from brakecli.front.progress import say, telling
 
 
 def show(text: str) -> None:
@@ -34,6 +35,14 @@ def show_result(
 def warn(*warnings: str) -> None:
     """Print warnings on standard error."""
     say(*(f"warning: {warning}" for warning in warnings))
+
+
+@contextmanager
+def showing_compilation(seconds: float) -> Iterator[Callable[[int, int], None]]:
+    """Show how far all kernels are, which are compiled once and take about so long."""
+    say(f"compiling all numerical kernels, once for this version; this takes about {seconds:.0f} s")
+    with telling(quiet=False) as tell:
+        yield lambda done, total: tell("kernels", done, total)
 
 
 def announce_compilation(trouble: str) -> None:

@@ -12,6 +12,8 @@ import pwd
 import stat
 from pathlib import Path
 
+TEMPORARY = "BRAKECLI_TEMPORARY_CACHE"
+"""The environment variable by which a process without a cache hands a temporary one to its workers."""
 FOR_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permissions by which others write into a folder."""
 OURS = 0o700
@@ -24,14 +26,14 @@ def source_hash(folder: Path = Path(__file__).parent) -> str:
     return hashlib.sha256(sources).hexdigest()[:16]
 
 
-def prepare() -> Path:
-    """The folder of this version's kernels, made where it is missing.
+def prepare(name: str = "") -> Path:
+    """The folder of this version's kernels, or of those that are made so as a name says; made where it is missing.
 
     Raises OSError where it cannot be made, and PermissionError where others could write there or swap it.
     """
-    named = os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    named = os.environ.get(TEMPORARY) or os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     base = Path(named) if named else Path.home() / ".cache"
-    folder = base.absolute() / "brakecli" / source_hash()
+    folder = base.absolute() / "brakecli" / f"{source_hash()}{name}"
     for each in [*reversed(folder.parents), folder]:
         if not each.exists():
             each.mkdir(mode=OURS, exist_ok=True)

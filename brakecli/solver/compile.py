@@ -18,7 +18,7 @@ from numba.core.registry import CPUDispatcher
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from brakecli.solver import compiling
+from brakecli.solver import beforehand, compiling
 from brakecli.solver.kernel_cache import compile_for, config, is_cached, not_compiled
 
 Floats = NDArray[np.float64]
@@ -26,6 +26,9 @@ vector = float64[::1]
 """A contiguous array of doubles, for the compiler."""
 FAST = frozenset({"reassoc", "contract", "nsz"})
 """What fast loops allow: sums in any order, fused multiply-add, no signed zeros; NaN stays NaN."""
+
+kernels: list[Any] = []
+"""Every kernel of this process, in the order of their definition."""
 
 events: Any = numba_events  # has no types
 F = TypeVar("F", bound=Callable[..., Any])
@@ -93,6 +96,11 @@ def ready(function: Any) -> Any:
     return function
 
 
+def is_kept(kernel: Any) -> bool:
+    """Whether the cache holds a kernel."""
+    return is_cached(kernel, kernel.signature)
+
+
 def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: bool = True) -> Callable[[F], F]:
     """Compile a function for one signature, strictly (no fastmath unless named), ahead of its first call.
 
@@ -110,7 +118,8 @@ def kernel(signature: Any, *, fastmath: frozenset[str] = frozenset(), inlined: b
             compiled.__class__ = _Waiting
             compiled.signature = signature
             compiled.private = private
-            if not private and not is_cached(compiled, signature):  # before anything is timed
+            kernels.append(compiled)
+            if beforehand.is_lazy() and not private and not is_kept(compiled):  # before anything is timed
                 ready(compiled)
         return compiled  # type: ignore[no-any-return]
 

@@ -1,18 +1,36 @@
-"""What a program says before it compiles its first kernel; only the standard library is imported here."""
+"""What a program says while kernels are compiled; only the standard library is imported here."""
 
 from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+
+Tell = Callable[[int, int], None]
+"""Called with how many kernels are there, of how many; both 0 as long as this is not known."""
+Progress = Callable[[float], AbstractContextManager[Tell]]
+"""Called with the seconds that all kernels take, about, before they are compiled."""
 
 _notice: Callable[[str], object] | None = None
+_progress: Progress | None = None
 _trouble = ""
 
 
 def set_notice(notice: Callable[[str], object] | None) -> None:
-    """Have this process call `notice` before it compiles its first kernel; None: it compiles in silence.
+    """Have this process call `notice` before it compiles a first kernel itself; None: it compiles in silence.
 
     `notice` gets what keeps this process from using the cache, with the remedy; an empty text if nothing does.
     """
     global _notice
     _notice = notice
+
+
+def set_progress(progress: Progress | None) -> None:
+    """Have this process show how far the kernels are that are compiled beforehand; None: it waits in silence."""
+    global _progress
+    _progress = progress
+
+
+def progress(seconds: float) -> AbstractContextManager[Tell]:
+    """What shows it, for something that takes about so many seconds."""
+    return _progress(seconds) if _progress is not None else nullcontext(lambda done, total: None)
 
 
 def set_trouble(text: str) -> None:

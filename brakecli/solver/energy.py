@@ -4,7 +4,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from brakecli.solver.records import Coefficients, Weights
+from brakecli.solver.coefficients import Coefficients
+from brakecli.solver.records import Weights
 
 OPEN_ACCOUNT = 0.1
 """Relative closing error from which on a motion is not worth having: the step does not resolve it."""

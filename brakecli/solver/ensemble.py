@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from brakecli import stop
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, ready
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
@@ -22,7 +23,7 @@ from brakecli.solver.lanes import advance
 from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, PAIR, STEPS, THETA_1, WAVES, Shared
 from brakecli.solver.motion import Motion, OwnError, Work
 from brakecli.solver.quantities import HISTORY
-from brakecli.solver.records import PARTS, Coefficients
+from brakecli.solver.records import PARTS
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.steady_sliding import sliding

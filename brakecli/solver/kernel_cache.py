@@ -1,40 +1,89 @@
 """The cache of compiled kernels on disk: where it is, its files with checksums, and who compiles what now."""
 
+import atexit
 import fcntl
 import io
 import os
+import shutil
+import sys
+import tempfile
 import time
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from functools import cache
 from pathlib import Path
 from typing import Any
 
+import llvmlite
+import numba
+from llvmlite import binding as llvm
 from numba import njit
 from numba.core import caching as numba_caching
 from numba.core import codegen as numba_codegen
 from numba.core import config as numba_config
 
-from brakecli.solver import cache_folder, compiling
+from brakecli.solver import beforehand, cache_folder, compiling
 
 config: Any = numba_config  # its settings come from the environment, so type checkers know none of them
 caching: Any = numba_caching  # has no types
 codegen: Any = numba_codegen  # has no types
 
 
+def _facts() -> dict[str, str]:
+    """What kernels depend on beside their sources."""
+    return {
+        "python": sys.version,
+        "numba": numba.__version__,
+        "llvmlite": llvmlite.__version__,
+        "processor": f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}",
+        "path": str(Path(__file__).parent),
+        **{name: value for name, value in os.environ.items() if name.startswith("NUMBA_CPU_")},
+    }
+
+
+FACTS = _facts()
+
+
 def _cache_directory() -> Path | None:
-    """Where machine code is kept; None where nothing can be written, or where somebody else could write, too."""
-    global _lock
+    """Where machine code is kept; None where it cannot be kept.
+
+    Where others could write, or nobody, it is a folder for this process and its workers.
+    """
+    name = f"-{zlib.crc32(repr(sorted(FACTS.items())).encode()):08x}"
     try:
-        directory = cache_folder.prepare()
-        _lock = os.open(directory / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+        return _opened(name)
     except (OSError, RuntimeError) as error:
         why = getattr(error, "strerror", None) or str(error)
         where = getattr(error, "filename", None) or "the folder of caches"
         what = f"the cache of compiled kernels cannot be used: {why[0].lower()}{why[1:]} (found {where})"
         compiling.set_trouble(f"{what}; name a folder of your own with XDG_CACHE_HOME")
-        return None
+        return _temporary(name)
+
+
+def _opened(name: str) -> Path:
+    """The folder of a name, whose file of locks is open."""
+    global _lock
+    directory = cache_folder.prepare(name)
+    _lock = os.open(directory / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
     return directory
+
+
+def _temporary(name: str) -> Path | None:
+    """A folder that goes with this process, in which it keeps what is needed, also for its workers."""
+    try:
+        folder = tempfile.mkdtemp(prefix="brakecli-")
+        os.environ[cache_folder.TEMPORARY] = folder
+        os.environ[beforehand.VARIABLE] = beforehand.LAZY
+        atexit.register(_removed, folder, os.getpid())
+        return _opened(name)
+    except (OSError, RuntimeError):
+        return None
+
+
+def _removed(folder: str, owner: int) -> None:
+    if os.getpid() == owner:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 _lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
@@ -53,6 +102,12 @@ class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
     def load(self, key: Any) -> Any:
         found = super().load(key)
         if found is None:
+            if CACHE is not None and beforehand.names(CACHE, Path(self._index_path)):
+                beforehand.forget(CACHE)  # what should be there cannot be loaded
+                _prepare.cache_clear()
+                _prepare()
+                if (found := super().load(key)) is not None:
+                    return found
             _wait_for_others(zlib.crc32(Path(self._index_path).name.encode()))
             found = super().load(key)  # another process may have compiled it meanwhile
         return found
@@ -142,8 +197,16 @@ def is_cached(dispatcher: Any, signature: Any) -> bool:
     return cache._index_key(signature, dispatcher.targetctx.codegen()) in cache._cache_file._load_index()
 
 
+@cache
+def _prepare() -> None:
+    """See to it once that the cache holds all kernels; what keeps it from that is told with the first compiled."""
+    if CACHE is not None and (why := beforehand.prepare(CACHE, FACTS)):
+        compiling.set_trouble(why)
+
+
 def compile_for(dispatcher: Any, signature: Any) -> None:
-    """Compile a kernel for one signature, or load it from the cache."""
+    """Compile a kernel for one signature, or load it from the cache, which then holds all of them."""
+    _prepare()
     before = len(_held)
     maker = dispatcher.targetctx.codegen()
     maker._library_class, libraries = _Whole, maker._library_class

@@ -4,7 +4,7 @@ import math
 from functools import lru_cache
 from typing import Any
 
-from brakecli.solver.records import Coefficients
+from brakecli.solver.coefficients import Coefficients
 
 Pair = tuple[Any, Any]
 

@@ -1,6 +1,5 @@
 """What compiled code works on: records with named fields, what is given to a step, signatures of the plug-ins."""
 
-import math
 from operator import itemgetter
 from typing import Any, NamedTuple
 
@@ -9,6 +8,7 @@ import numpy as np
 from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, vector
 from brakecli.solver.contact import MOST_KINDS
 
@@ -190,25 +190,6 @@ WINDOW = record(
 KNOT = record("time value value_low slope slope_low integral integral_low")
 """A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are
 sums of two doubles, to 32 digits."""
-
-
-class Coefficients(NamedTuple):
-    """The constants of (6)-(7) and of the friction law, in the paper's symbols (SI units)."""
-
-    m: float
-    b_xx: float
-    b_xy: float
-    b_yy: float
-    c_xx: float
-    c_xy: float
-    c_yy: float
-    sin_beta: float  # Q_x = Q sin(beta)
-    cos_beta: float  # Q_y = Q cos(beta)
-    phi: float
-
-    def grip(self, belt: float) -> float:
-        """φ sign(U), the friction force of steady sliding over the normal force; 0 where the wheel stands."""
-        return math.copysign(self.phi, belt) if belt else 0.0
 
 
 class Weights(NamedTuple):

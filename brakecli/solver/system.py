@@ -9,11 +9,12 @@ import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST_EVALUATIONS, Method
-from brakecli.solver.records import Coefficients, Grid, Weights
+from brakecli.solver.records import Grid, Weights
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, value_at
 

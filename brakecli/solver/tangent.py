@@ -18,8 +18,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, void
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, TANGENT_TYPE, Beside, Coefficients
+from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, TANGENT_TYPE, Beside
 
 BATCHES = 8
 """Batches of the parts of the second half of a run; of twice as many parts each, half as many."""

@@ -20,9 +20,10 @@ from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
 from brakecli.solver import automaton
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.energy import Mechanical
-from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Coefficients, Weights
+from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Weights
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH, TURN = range(7)
 """Kinds of events: turning points of x, begin and end of a stick, end and begin of contact, and sliding that turns

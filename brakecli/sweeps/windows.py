@@ -6,8 +6,10 @@ from enum import StrEnum
 from itertools import pairwise
 from typing import NamedTuple
 
-from brakecli.branches.bar import WIDEST
 from brakecli.sweeps.tables import Critical
+
+WIDEST = 1.0 / 3.0
+"""Part of the range that an error bar with an answer may have."""
 
 
 class Outcome(StrEnum):

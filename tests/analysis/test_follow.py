@@ -7,8 +7,8 @@ import pytest
 
 from brakecli.analysis.stability.follow import Pair, followed
 from brakecli.analysis.stability.modes import modes
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.links import coefficients
-from brakecli.solver.records import Coefficients
 from tests.analysis.test_stability import full_matrix, random_shoe
 from tests.campaign import counts
 

@@ -9,9 +9,9 @@ import pytest
 from brakecli.analysis.stability.modes import crossings, eigensystem, growth, modes
 from brakecli.analysis.stability.report import is_stable, stability, step_limit, undamped_critical
 from brakecli.case.system import system_of
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.links import coefficients, natural_frequencies
-from brakecli.solver.records import Coefficients
 from brakecli.solver.steady_sliding import PLACES, add_places, averaged_length
 from brakecli.solver.system import System
 from tests.analysis.mirrored import mirrored, rough_shoe

@@ -15,7 +15,7 @@ from brakecli.files.os_signals import guard_streams
 from tests.campaign import campaign, counts
 from tests.cli.mutator import mutated, with_another_header
 from tests.cli.test_surroundings import COMPILING, ODD, odd_in
-from tests.commands import TINY, brakecli, forked, left_in, shell
+from tests.commands import TINY, brakecli, forked, lazily, left_in, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -171,7 +171,7 @@ def test_every_limit_of_the_address_space_that_is_too_small_is_told(here: Path) 
 def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
     chance = random.Random(17)
     cache = here / "cache"
-    brakecli("check", "tiny.toml", cwd=here, stdin="", XDG_CACHE_HOME=str(cache)).told(0)
+    brakecli("check", "tiny.toml", cwd=here, stdin="", **lazily(cache)).told(0)
     files = sorted(cache.rglob("*.nb?"))
     assert files
     kept = shutil.copytree(cache, here / "kept")
@@ -182,7 +182,7 @@ def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
             noise = data[:at] + chance.randbytes(50) + data[at + 50 :]
             bad = (b"", data[:at], chance.randbytes(len(data)), noise, noise, noise)
             path.write_bytes(chance.choice(bad))
-        done = brakecli("check", "tiny.toml", "--json", cwd=here, stdin="", XDG_CACHE_HOME=str(cache))
+        done = brakecli("check", "tiny.toml", "--json", cwd=here, stdin="", **lazily(cache))
         assert done.told(0) in ("", COMPILING)  # only what is damaged is compiled anew
         assert done.json["steps"] == 2000
         shutil.copytree(kept, cache, dirs_exist_ok=True)

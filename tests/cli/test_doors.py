@@ -16,7 +16,7 @@ import brakecli as brakecli_in_python
 from brakecli.errors import UsageError
 from brakecli.sweeps import driver
 from tests.campaign import campaign
-from tests.commands import TINY, brakecli, each, ended, forked, run, started
+from tests.commands import TINY, brakecli, each, ended, forked, lazily, run, started
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -242,8 +242,8 @@ def test_python_looks_for_the_cluster_that_the_environment_names(
 def test_first_runs_side_by_side_compile_once(here: Path) -> None:
     cache = str(here / "cache")
     with (
-        started("run", "tiny.toml", "-o", "a.h5", cwd=here, XDG_CACHE_HOME=cache) as one,
-        started("run", "tiny.toml", "-o", "b.h5", cwd=here, XDG_CACHE_HOME=cache) as two,
+        started("run", "tiny.toml", "-o", "a.h5", cwd=here, **lazily(cache)) as one,
+        started("run", "tiny.toml", "-o", "b.h5", cwd=here, **lazily(cache)) as two,
     ):
         told = [ended(one, 300.0).told(0), ended(two, 300.0).told(0)]
     assert (here / "a.h5").read_bytes() == (here / "b.h5").read_bytes()

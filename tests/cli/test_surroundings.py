@@ -10,7 +10,7 @@ import h5py
 import pytest
 
 from tests.campaign import campaign
-from tests.commands import TINY, Done, brakecli, each, shell
+from tests.commands import TINY, Done, brakecli, each, lazily, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -24,7 +24,14 @@ COMPILING = (
 def test_the_surroundings_change_no_bit(good: Path, here: Path) -> None:
     surroundings: list[dict[str, str | None]] = [
         {"LC_ALL": "de_DE.UTF-8", "LC_NUMERIC": "de_DE.UTF-8", "LANG": "de_DE.UTF-8", "COLUMNS": "1"},
-        {"LC_ALL": "C", "PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "PYTHONIOENCODING": "ascii", "HOME": None},
+        {
+            "LC_ALL": "C",
+            "PYTHONUTF8": "0",
+            "PYTHONCOERCECLOCALE": "0",
+            "PYTHONIOENCODING": "ascii",
+            "HOME": None,
+            "BRAKECLI_COMPILE": "lazy",
+        },
         {"TERM": "dumb", "NO_COLOR": "1", "COLUMNS": "no", "HDF5_USE_FILE_LOCKING": "FALSE", "TZ": "Asia/Tokyo"},
     ]
 
@@ -44,7 +51,7 @@ def test_the_surroundings_change_no_bit(good: Path, here: Path) -> None:
 
 @campaign
 def test_without_a_place_for_compiled_code_everything_works_but_slower(here: Path) -> None:
-    done = brakecli("check", "tiny.toml", "--json", cwd=here, XDG_CACHE_HOME="/proc/nowhere")
+    done = brakecli("check", "tiny.toml", "--json", cwd=here, **lazily("/proc/nowhere"))
     told = done.told(0, "warning: the cache of compiled kernels cannot be used: ", "XDG_CACHE_HOME")
     assert told.startswith(COMPILING)
     assert told.count("\n") == 2
@@ -54,7 +61,7 @@ def test_without_a_place_for_compiled_code_everything_works_but_slower(here: Pat
 @campaign
 def test_a_command_says_that_it_compiles_when_it_does_and_only_then(good: Path, here: Path) -> None:
     def told(*arguments: str | Path) -> str:
-        return brakecli(*arguments, cwd=here, XDG_CACHE_HOME=str(here / "cache")).told(0)
+        return brakecli(*arguments, cwd=here, **lazily(here / "cache")).told(0)
 
     assert told("info", good / "tiny.h5") == ""
     assert not (here / "cache").exists()  # nothing has been compiled
@@ -131,4 +138,4 @@ def test_an_address_space_too_small_for_the_libraries_is_told_before_they_are_lo
 @campaign
 def test_an_address_space_that_is_just_large_enough_is(here: Path) -> None:
     for command in ("run tiny.toml", "compare-schemes tiny.toml --budget 1"):  # the second compiles every scheme
-        shell(f"ulimit -v 735000; $B {command} -q", here, XDG_CACHE_HOME=str(here)).told(0)
+        shell(f"ulimit -v 735000; $B {command} -q", here, **lazily(here)).told(0)

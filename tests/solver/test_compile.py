@@ -31,10 +31,14 @@ print(bool(told))
 """
 
 
+def lazily(cache: Path) -> dict[str, str]:
+    return {**os.environ, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_JIT": "0", "BRAKECLI_COMPILE": "lazy"}
+
+
 def python(program: str, cache: Path) -> str:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "NUMBA_DISABLE_JIT": "0"}
+    """What a program prints that compiles each kernel as it needs it, into a cache of its own."""
     done = subprocess.run(
-        [sys.executable, "-c", program], env=environment, capture_output=True, text=True, check=True
+        [sys.executable, "-c", program], env=lazily(cache), capture_output=True, text=True, check=True
     )
     return done.stdout
 
@@ -80,9 +84,8 @@ def test_a_kind_of_kernels_that_a_warm_cache_lacks_brings_the_notice(cache: Path
 
 @campaign
 def test_python_compiles_in_silence(tmp_path: Path) -> None:
-    environment = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "NUMBA_DISABLE_JIT": "0"}
     words = [sys.executable, "-c", "import brakecli.solver.friction"]
-    done = subprocess.run(words, env=environment, capture_output=True, check=True)
+    done = subprocess.run(words, env=lazily(tmp_path), capture_output=True, check=True)
     assert done.stdout + done.stderr == b""
     assert any(tmp_path.rglob("*.nbc"))
 

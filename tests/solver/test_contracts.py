@@ -15,11 +15,12 @@ from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema
 from brakecli.errors import CaseError
 from brakecli.solver import contact, schemes
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import auto, closed_form, exact, midpoint
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.implicit_step import SOLVED, newton
 from brakecli.solver.loop import advance
-from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
+from brakecli.solver.records import PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import event_driven, piecewise_exact, three_layer, two_layer
 from tests.solver import small_scheme

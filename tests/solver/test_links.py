@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.links import coefficients
-from brakecli.solver.records import Coefficients
 
 EPS = 2.0**-52
 stiffness = st.floats(0, 1e12)

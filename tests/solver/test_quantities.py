@@ -1,7 +1,7 @@
 """The vocabulary covers what the code computes with and stores."""
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.quantities import COEFFICIENTS, HISTORY, ContactState, Failure
-from brakecli.solver.records import Coefficients
 
 
 def test_every_coefficient_and_every_column_has_its_words() -> None:

@@ -7,10 +7,11 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.closed_form import evaluate as closed_form
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.method import MOST_EVALUATIONS, Method
-from brakecli.solver.records import PROBLEM, WORK, Coefficients, Weights, new
+from brakecli.solver.records import PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import SteppingModule
 from brakecli.solver.system import System

@@ -25,9 +25,9 @@ from brakecli.analysis.stability.modes import (
     stiffness_matrix,
 )
 from brakecli.solver.alike import at_once
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats as Array
 from brakecli.solver.quantities import ContactState
-from brakecli.solver.records import Coefficients
 from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System
 

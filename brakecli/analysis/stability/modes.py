@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.solver.records import Coefficients
+from brakecli.solver.coefficients import Coefficients
 
 Complex = NDArray[np.complex128]
 Tensor = tuple[Any, Any, Any]

@@ -21,8 +21,8 @@ from brakecli.analysis.stability.modes import (
 )
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.records import Coefficients
 from brakecli.solver.roots import bracketed_root
 from brakecli.solver.steady_sliding import (
     UNPRESSED,

@@ -15,10 +15,11 @@ from typing import Any
 import numba
 from numba import float64, int64, types, void
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import kernel
 from brakecli.solver.flow.smooth import DONE, MOST_EVENTS, MOST_STEPS, PATH_TYPE, flow, step, zero_of_velocity
 from brakecli.solver.motions import BELT, FLOW_TYPE, PHASES, SIZE, TERMS, V_X, V_Y, X, Y
-from brakecli.solver.records import COEFFICIENTS, Coefficients, record
+from brakecli.solver.records import COEFFICIENTS, record
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT
 from brakecli.solver.schemes.piecewise_exact.steps import look

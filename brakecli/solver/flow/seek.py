@@ -15,12 +15,13 @@ from numba import float64, int64, void
 from numpy.typing import NDArray
 
 from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.flow.orbit import MOST_TURNS, PURSUIT, PURSUIT_TYPE, closed, note_event, sizes
 from brakecli.solver.flow.repeating import Orbit
 from brakecli.solver.flow.smooth import MOST_EVENTS, MOST_STEPS, PATH, PATH_TYPE, step, zero_of_velocity
 from brakecli.solver.motions import BELT, FLOW, FLOW_TYPE, LOAD, SIZE, V_X, V_Y, X, Y
-from brakecli.solver.records import COEFFICIENTS, Coefficients, new
+from brakecli.solver.records import COEFFICIENTS, new
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.steps import look
 from brakecli.solver.schemes.piecewise_exact.switch import place

@@ -19,9 +19,10 @@ import numpy as np
 from numba import float64, int64, void
 
 from brakecli.solver.automaton import OPEN, STICK
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.motions import BELT, FLOW, FLOW_TYPE, LOAD, MARGINS, PHASES, SIZE, TERMS, V_X, X
-from brakecli.solver.records import COEFFICIENTS, Coefficients, new, record
+from brakecli.solver.records import COEFFICIENTS, new, record
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import NO_EVENT, first_event, root
 from brakecli.solver.schemes.piecewise_exact.steps import look, whole

@@ -5,8 +5,9 @@ from typing import Any, NamedTuple
 import numba
 from numba import float64, int64, types
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import FAST, Floats, vector
-from brakecli.solver.records import Coefficients, record
+from brakecli.solver.records import record
 from brakecli.solver.schemes import NUMEROV
 
 LANES = 16

@@ -9,9 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
 
 if TYPE_CHECKING:
+    from brakecli.solver.coefficients import Coefficients
     from brakecli.solver.compile import Floats
     from brakecli.solver.energy import Mechanical
-    from brakecli.solver.records import Coefficients, Pair, Plant, Weights
+    from brakecli.solver.records import Pair, Plant, Weights
 
 HALF: tuple[float, ...] = 0.5, 0.5
 QUARTERS: tuple[float, ...] = 0.25, 0.5, 0.25

@@ -3,9 +3,10 @@
 from typing import Any
 
 from brakecli.solver import loop, records
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import kernel
 from brakecli.solver.energy import energy_at_level
-from brakecli.solver.records import Coefficients, Pair, Weights
+from brakecli.solver.records import Pair, Weights
 
 STATE = records.STATE
 hold = loop.hold

@@ -6,12 +6,13 @@ from typing import Any
 from numba import float64, int64, types, void
 
 from brakecli.solver.automaton import PULL, STICK, UNDECIDED, following, sliding_phase
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, from_memory, into_memory, kernel, stopped, vector
 from brakecli.solver.flow.rough.contact import press
 from brakecli.solver.flow.rough.record import COLUMNS, MOST_EVENTS, ROUGH_TYPE, Status
 from brakecli.solver.flow.rough.step import find_margins, look, rounding, step, take_hold
 from brakecli.solver.motions import V_X, V_Y, X, Y
-from brakecli.solver.records import COEFFICIENTS, Coefficients, Parts
+from brakecli.solver.records import COEFFICIENTS, Parts
 
 BOUND = 1e100  # of a state, beyond which the motion has run away
 LANDING = 16  # parts of a step in which the whole pad lands or lifts off: the force has a kink there

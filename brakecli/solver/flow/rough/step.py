@@ -5,11 +5,12 @@ from typing import Any
 from numba import float64, int64, void
 
 from brakecli.solver.automaton import STICK, held
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel, vector
 from brakecli.solver.flow.rough.contact import press
 from brakecli.solver.flow.rough.record import COLUMNS, ROUGH_TYPE, STAGES
 from brakecli.solver.motions import V_X, V_Y, X, Y
-from brakecli.solver.records import COEFFICIENTS, Coefficients
+from brakecli.solver.records import COEFFICIENTS
 from brakecli.solver.runge_kutta import END_STAGE, NODES, A
 
 _A = A[1, :STAGES, :STAGES].copy()

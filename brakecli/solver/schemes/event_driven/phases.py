@@ -23,12 +23,13 @@ from brakecli.solver.automaton import (
     held,
     side_of,
 )
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import at_address, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.motions import MOTION_TYPE, V_X, V_Y, X, Y
-from brakecli.solver.records import COEFFICIENTS, Coefficients, Drive, Layer
+from brakecli.solver.records import COEFFICIENTS, Drive, Layer
 from brakecli.solver.roughness import turn
 from brakecli.solver.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.schedules import integral_at, slope_at, value_at

@@ -10,6 +10,7 @@ import numpy as np
 from numba import float64, int64, types, void
 
 from brakecli.solver.automaton import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.motions import (
     BELT,
@@ -26,7 +27,7 @@ from brakecli.solver.motions import (
     X,
     Y,
 )
-from brakecli.solver.records import COEFFICIENTS, WORK_TYPE, Coefficients
+from brakecli.solver.records import COEFFICIENTS, WORK_TYPE
 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]

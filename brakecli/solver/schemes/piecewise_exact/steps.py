@@ -5,6 +5,7 @@ from typing import Any
 
 from numba import float64, int64, types, void
 
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import kernel
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.motions import (
@@ -21,7 +22,7 @@ from brakecli.solver.motions import (
     X,
     Y,
 )
-from brakecli.solver.records import COEFFICIENTS, TANGENT_TYPE, TRACK_TYPE, Coefficients
+from brakecli.solver.records import COEFFICIENTS, TANGENT_TYPE, TRACK_TYPE
 from brakecli.solver.schemes.piecewise_exact.phases import acceleration
 from brakecli.solver.tangent import kept
 from brakecli.solver.track import put, turned

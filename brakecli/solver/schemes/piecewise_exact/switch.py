@@ -5,9 +5,10 @@ from typing import Any
 from numba import boolean, float64, int64, types, void
 
 from brakecli.solver.automaton import HEIGHT, OPEN, PULL, PUSH, STICK, UNDECIDED, following, held, sliding_phase
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import kernel
 from brakecli.solver.motions import BELT, FLOW_TYPE, SIZE, TERMS, V_X, V_Y, Y
-from brakecli.solver.records import COEFFICIENTS, Coefficients
+from brakecli.solver.records import COEFFICIENTS
 from brakecli.solver.schemes.piecewise_exact import phases
 from brakecli.solver.schemes.piecewise_exact.locate import ROUNDING
 

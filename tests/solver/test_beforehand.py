@@ -1,0 +1,274 @@
+"""Kernels that are compiled beforehand: the manifest, who waits for whom, and what is done where it cannot be."""
+
+import fcntl
+import os
+import resource
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from brakecli.solver import beforehand, compiling
+from tests.campaign import campaign
+from tests.commands import TINY, brakecli, ended, environment, started, wait_until
+
+FACTS = {"numba": "1.2"}
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
+    """The folders in which children would have compiled, which write two kernels instead."""
+    folders: list[Path] = []
+
+    def write(folder: Path, tell: compiling.Tell) -> str:
+        (folder / "part").mkdir(exist_ok=True)
+        (folder / "part" / "a.1.nbc").write_bytes(b"code")
+        (folder / "part" / "a.nbi").write_bytes(b"index")
+        tell(1, 1)
+        folders.append(folder)
+        return ""
+
+    monkeypatch.delenv(beforehand.VARIABLE, raising=False)
+    monkeypatch.setattr(beforehand, "_compiled", write)
+    return folders
+
+
+def test_what_is_there_is_not_compiled_again(made: list[Path], tmp_path: Path) -> None:
+    for _ in range(3):
+        assert beforehand.prepare(tmp_path, FACTS) == ""
+    assert made == [tmp_path]
+    assert beforehand.names(tmp_path, tmp_path / "part" / "a.nbi")
+    assert not beforehand.names(tmp_path, tmp_path / "part" / "b.nbi")
+    assert not beforehand.names(tmp_path / "part", tmp_path / "part" / "a.nbi")
+
+
+def _shorten(folder: Path) -> None:
+    (folder / "part" / "a.1.nbc").write_bytes(b"cod")
+
+
+def _remove(folder: Path) -> None:
+    (folder / "part" / "a.nbi").unlink()
+
+
+def _break(folder: Path) -> None:
+    (folder / beforehand.MANIFEST).write_text("{")
+
+
+def _list(folder: Path) -> None:
+    (folder / beforehand.MANIFEST).write_text("[1]")
+
+
+@pytest.mark.parametrize("change", [_shorten, _remove, _break, _list, beforehand.forget])
+def test_what_does_not_fit_is_made_anew_as_a_whole(
+    made: list[Path], tmp_path: Path, change: Callable[[Path], None]
+) -> None:
+    beforehand.prepare(tmp_path, FACTS)
+    (tmp_path / "part" / "old.nbc").write_bytes(b"")
+    change(tmp_path)
+    assert beforehand.prepare(tmp_path, FACTS) == ""
+    assert len(made) == 2
+    assert not (tmp_path / "part" / "old.nbc").exists()
+    assert beforehand.prepare(tmp_path, FACTS) == ""
+    assert len(made) == 2
+
+
+def test_other_versions_and_touched_sources_are_made_anew(
+    made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    beforehand.prepare(tmp_path, FACTS)
+    beforehand.prepare(tmp_path, {"numba": "1.3"})
+    assert len(made) == 2
+    monkeypatch.setattr(beforehand, "_stamps", lambda: {"friction.py": [1, 2]})
+    beforehand.prepare(tmp_path, {"numba": "1.3"})
+    assert len(made) == 3
+
+
+@pytest.mark.parametrize("mode", [beforehand.LAZY, beforehand.CHILD])
+def test_whoever_compiles_himself_waits_for_nobody(
+    made: list[Path], tmp_path: Path, mode: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(beforehand.VARIABLE, mode)
+    assert beforehand.prepare(tmp_path, FACTS) == ""
+    assert made == []
+
+
+def test_what_keeps_children_from_compiling_is_told(
+    made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=1, f_frsize=4096))
+        assert beforehand.prepare(tmp_path, FACTS).endswith(f"the disk of {tmp_path} is nearly full")
+    with monkeypatch.context() as patch:
+        patch.setattr(resource, "getrlimit", lambda which: (10**9, 10**9))
+        assert beforehand.prepare(tmp_path, FACTS).endswith("the address space is limited")
+    with monkeypatch.context() as patch:
+        patch.setattr(sys, "executable", "")
+        assert beforehand.prepare(tmp_path, FACTS).endswith("there is no interpreter to start")
+    with monkeypatch.context() as patch:
+        patch.setattr(beforehand, "_LOCK", "no/such/folder")
+        assert beforehand.prepare(tmp_path, FACTS).endswith("beforehand: No such file or directory")
+    assert made == []
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ("echo one >&2; echo out of memory >&2; exit 1", "out of memory"),
+        ("exit 0", "0 of 0 could be kept"),
+        ("kill -9 $$", "0 of 0 could be kept"),
+    ],
+)
+def test_children_that_fail_leave_no_manifest_and_their_last_line(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str
+) -> None:
+    interpreter = tmp_path / "python"
+    interpreter.write_text(f"#!/bin/sh\n{script}\n")
+    interpreter.chmod(0o755)
+    cache = tmp_path / "cache"
+    cache.mkdir()
+    monkeypatch.delenv(beforehand.VARIABLE, raising=False)
+    monkeypatch.setattr(sys, "executable", str(interpreter))
+    assert beforehand.prepare(cache, FACTS) == f"the kernels cannot be compiled beforehand: {said}"
+    assert not (cache / beforehand.MANIFEST).exists()
+
+
+def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
+    made: list[Path], tmp_path: Path
+) -> None:
+    """The other one lets go of the lock once it has been told of its progress twice."""
+    beforehand.prepare(tmp_path, FACTS)
+    manifest = (tmp_path / beforehand.MANIFEST).read_bytes()
+    beforehand.forget(tmp_path)
+    (tmp_path / "total").write_text("7")
+    told: list[tuple[int, int]] = []
+    with (tmp_path / "beforehand.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+
+        @contextmanager
+        def shown(seconds: float) -> Iterator[compiling.Tell]:
+            assert seconds > 0.0
+
+            def tell(done: int, total: int) -> None:
+                told.append((done, total))
+                if len(told) == 2:
+                    (tmp_path / beforehand.MANIFEST).write_bytes(manifest)
+                    fcntl.flock(lock, fcntl.LOCK_UN)
+
+            yield tell
+
+        compiling.set_progress(shown)
+        try:
+            assert beforehand.prepare(tmp_path, FACTS) == ""
+        finally:
+            compiling.set_progress(None)
+    assert told == [(1, 7), (1, 7)]
+    assert made == [tmp_path]
+
+
+def child(folder: Path, cache: Path, stdin: int) -> subprocess.CompletedProcess[str]:
+    changes: dict[str, str | None] = {"XDG_CACHE_HOME": str(cache), beforehand.VARIABLE: beforehand.CHILD}
+    words = [sys.executable, "-P", "-m", beforehand.__name__, str(folder), "0", "1"]
+    return subprocess.run(words, stdin=stdin, capture_output=True, text=True, env=environment(**changes))
+
+
+@campaign
+def test_a_child_ends_with_the_process_that_has_started_it(tmp_path: Path) -> None:
+    """Its standard input has an end then."""
+    wrong = child(tmp_path, tmp_path / "cache", subprocess.PIPE)
+    (folder,) = (tmp_path / "cache" / "brakecli").iterdir()
+    assert wrong.stderr == f"the cache is {folder}, not {tmp_path}\n"
+    assert child(folder, tmp_path / "cache", subprocess.DEVNULL).returncode == 0
+    assert int((folder / "total").read_text()) > 100
+    assert not any(folder.rglob("*.nbc"))
+
+
+COUNT = """
+from numba.core import event
+from brakecli.cli.app import main
+import sys
+compiled = []
+
+class Compiling(event.Listener):
+    def on_start(self, event):
+        compiled.append(event)
+
+    def on_end(self, event):
+        pass
+
+event.register("numba:compile", Compiling())
+for line in sys.argv[1:]:
+    sys.argv = ["brakecli", *line.split(), "--quiet"]
+    try:
+        main()
+    except SystemExit as end:
+        assert not end.code, line
+print(len(compiled))
+"""
+
+
+@campaign
+@pytest.mark.usefixtures("compiled")
+def test_whoever_computes_never_compiles(tmp_path: Path) -> None:
+    listed = brakecli("new", "--list", cwd=tmp_path).out
+    starters = [line.split()[0] for line in listed.splitlines() if line[:1].isalpha()]
+    lines = [f"new {name} -o {name}.toml" for name in starters]
+    for name in starters:
+        brakecli("new", name, "-o", f"{name}.toml", cwd=tmp_path)
+        text = (tmp_path / f"{name}.toml").read_text()
+        if "[shoe]" in text:
+            lines += [f"run {name}.toml --set solver.duration=0.01 -o {name}.h5", f"stability {name}.toml"]
+            lines += [f"compare-schemes {name}.toml --set solver.duration=0.001 --budget 1 -o {name}-c.h5"]
+    done = subprocess.run(
+        [sys.executable, "-c", COUNT, *lines[len(starters) :]],
+        cwd=tmp_path, env=environment(), capture_output=True, text=True,
+    )  # fmt: skip
+    assert (done.stdout, done.stderr) == ("0\n", "")
+    assert len(starters) > 3
+
+
+SENTENCE = "brakecli: compiling all numerical kernels, once for this version; this takes about "
+
+
+@campaign
+def test_first_commands_side_by_side_wait_for_one_and_a_killed_one_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY)
+    cache: dict[str, Any] = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
+
+    def kernels() -> int:
+        return len([*(tmp_path / "cache").rglob("*.nbc")])
+
+    with started("check", "tiny.toml", cwd=tmp_path, **cache) as first:
+        wait_until(lambda: kernels() > 3, 120.0)
+        os.killpg(first.pid, signal.SIGKILL)
+    with (
+        started("check", "tiny.toml", cwd=tmp_path, **cache) as one,
+        started("check", "tiny.toml", "-q", cwd=tmp_path, **cache) as two,
+    ):
+        said = ended(one, 900.0).told(0)
+        assert ended(two, 900.0).told(0) == ""
+    assert said.startswith(SENTENCE)
+    assert brakecli("check", "tiny.toml", cwd=tmp_path, stdin="", **cache).told(0) == ""
+    (folder,) = (tmp_path / "cache" / "brakecli").iterdir()
+    assert int((folder / "total").read_text()) == kernels()
+    # one that is damaged, and as long as before, is made anew with all others: here by a copy
+    kept = shutil.copytree(folder, tmp_path / "kept", ignore=shutil.ignore_patterns("*.json", "*lock*"))
+    (path,) = folder.rglob("friction.minimise-*.nbc")
+    path.write_bytes(bytes(path.stat().st_size))
+    program = f"""
+import shutil
+from brakecli.solver import beforehand
+beforehand._compiled = lambda folder, tell: str(shutil.copytree({str(kept)!r}, folder, dirs_exist_ok=True))[:0]
+from brakecli.solver import friction
+print(friction.minimise(1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0))
+"""
+    words = [sys.executable, "-c", program]
+    done = subprocess.run(words, env=environment(**cache), capture_output=True, text=True, check=True)
+    assert done.stdout == "(2.0, 0.0, 1.0)\n"
+    assert path.read_bytes() == next(kept.rglob("friction.minimise-*.nbc")).read_bytes()
