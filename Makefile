@@ -12,8 +12,10 @@ LOWEST_STAMP := $(LOWEST)/.installed
 PEERS := $(VENV)/bench
 PEERS_STAMP := $(PEERS)/.installed
 PIP := $(BIN)/python -m pip --disable-pip-version-check --quiet
-# pip would compile all of the libraries, ten times what is imported. Python does it as they are, and keeps that.
+# pip would compile all of the libraries, ten times what is imported. What any command imports is imported once, so that
+# Python keeps its bytecode: where an environment forbids that later, each start would take seconds.
 INSTALL := $(PIP) install --no-compile --editable
+BYTECODE := $(BIN)/python -m benchmarks.imports
 unexport PYTHONDONTWRITEBYTECODE
 CASES := $(sort $(wildcard cases/*.toml))
 # PYTEST_ARGS=-n0 takes one process alone.
@@ -51,11 +53,13 @@ INSTALLED_FROM := pyproject.toml brakecli/about.py $(BIN)/python
 $(RUN_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli into $(VENV) ..."
 	@$(INSTALL) '.[tour]'
+	@$(BYTECODE)
 	@touch $@
 
 $(DEV_STAMP): $(INSTALLED_FROM)
 	@echo "installing brakecli and its development tools into $(VENV) ..."
 	@$(INSTALL) '.[dev]'
+	@$(BYTECODE)
 	@touch $@ $(RUN_STAMP)
 
 $(DOCS_STAMP): $(DEV_STAMP)

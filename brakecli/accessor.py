@@ -8,6 +8,7 @@ import base64
 import html
 import json
 from collections import Counter
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
@@ -22,7 +23,7 @@ from brakecli.errors import BrakecliError
 from brakecli.files import fields
 from brakecli.files.as_xarray import stored
 from brakecli.files.contents import DIFFERENCE_OF_TWO, Difference
-from brakecli.files.field import values_of
+from brakecli.files.field import Field, values_of
 from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER, STABILITY, THRESHOLDS
 from brakecli.front.file_tables import diff_table
 from brakecli.front.render import TERMINAL
@@ -142,19 +143,14 @@ class Accessor(Shown):
         """Where speed or load change: start, end (s), frequency (Hz), amplitude (m), speed (m/s)."""
         if "vibrations" not in self._groups:
             return self._records("vibrations", Vibration)
-        held = self._groups["vibrations"].to_dataset()
-        columns = [held[each.name].values.tolist() for each in fields.VIBRATION]
-        return tuple(Vibration(*map(_known, row)) for row in zip(*columns, strict=True))
+        return tuple(Vibration(**row) for row in self._rows("vibrations", fields.VIBRATION))
 
     @property
     def attractors(self) -> tuple[Attractor, ...]:
         """Of a sweep over initial states: each motion that its points come to, and their share."""
         found = json.loads(self._found.attrs.get("attractors", "[]"))
         if "attractors" in self._groups:
-            held = self._groups["attractors"].to_dataset()
-            columns = [held[each.name].values.tolist() for each in fields.ATTRACTOR]
-            names = [each.name for each in fields.ATTRACTOR]
-            found = [dict(zip(names, map(_known, row), strict=True)) for row in zip(*columns, strict=True)]
+            found = self._rows("attractors", fields.ATTRACTOR)
         for each in found:
             each["share"] = Probability(*map(each.pop, ("share", "share_lower", "share_upper")))
         return tuple(Attractor(**each) for each in found)
@@ -195,6 +191,12 @@ class Accessor(Shown):
         """A list of texts; xarray has saved one of a single text as this text."""
         given = self._found.attrs.get(name, ())
         return (given,) if isinstance(given, str) else tuple(map(str, given))
+
+    def _rows(self, group: str, columns: Sequence[Field]) -> list[dict[str, Any]]:
+        """The rows of a group, by the names of its columns."""
+        held = self._groups[group].to_dataset()
+        values = {each.name: map(_known, held[each.name].values.tolist()) for each in columns}
+        return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
     def _records(self, name: str, kind: type[_Record]) -> tuple[_Record, ...]:
         """A list of objects, or a single one, as records."""

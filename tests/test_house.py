@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.size import is_packed
+from benchmarks.size import is_packed, is_starred
 from tests.commands import ROOT
 
 PACKAGE = ROOT / "brakecli"
@@ -146,4 +146,99 @@ def test_every_assignment_has_a_line_of_its_own() -> None:
     ]
     found = {str(path.relative_to(ROOT)): wrong for path in paths if (wrong := packed(path.read_text()))}
     assert len(paths) > 400
+    assert not found
+
+
+def is_large_record(node: ast.ClassDef) -> bool:
+    """Whether a class is a NamedTuple or a dataclass of more than three fields."""
+    made_by = " ".join(map(ast.unparse, [*node.bases, *node.decorator_list]))
+    fields = [part for part in node.body if isinstance(part, ast.AnnAssign)]
+    return len(fields) > 3 and ("NamedTuple" in made_by or "dataclass" in made_by)
+
+
+def large_records(text: str) -> list[str]:
+    """The names of such records that a file defines."""
+    nodes = ast.walk(ast.parse(text))
+    return [node.name for node in nodes if isinstance(node, ast.ClassDef) and is_large_record(node)]
+
+
+def filled_by_place(text: str, records: set[str]) -> list[int]:
+    """The lines in which these records, or `cls` of one of them, are filled by starred tuples, or by `_make`."""
+    tree = ast.parse(text)
+    places = [(node, records) for node in ast.walk(tree)]
+    for owner in ast.walk(tree):
+        if isinstance(owner, ast.ClassDef) and owner.name in records:
+            places += [(node, {"cls"}) for node in ast.walk(owner)]
+    found = set[int]()
+    for node, names in places:
+        if isinstance(node, ast.Call):
+            *_, before, last = ["", *ast.unparse(node.func).split(".")]
+            if (last in names and is_starred(node)) or (last == "_make" and before in names):
+                found.add(node.lineno)
+    return sorted(found)
+
+
+RECORDS = """
+class Seen(NamedTuple):
+    a: float
+    b: float
+    c: float
+    d: float = 0.0
+    @classmethod
+    def of(cls, row): return cls(*row)
+
+@dataclass(frozen=True)
+class Mode(Generic[A]):
+    a: float
+    b: float
+    c: float
+    d: float
+
+@dataclasses.dataclass
+class Row(Shown):
+    a: float
+    b: float
+    c: float
+    d: float
+
+class Pair(NamedTuple):
+    a: float
+    b: float
+
+class Plain:
+    a: float
+    b: float
+    c: float
+    d: float
+"""
+
+
+def test_records_of_many_fields_are_seen() -> None:
+    assert large_records(RECORDS) == ["Seen", "Mode", "Row"]
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("Seen(*row)", [1]),
+        ("a = 0.0\nb = [seen.Seen(a, *each, d=a) for each in rows]", [2]),
+        ("Seen(\n    Mode(*row[:4]), *row[4:]\n)", [1, 2]),
+        ("Seen._make(row)\nseen.Seen._make(row)", [1, 2]),
+        (RECORDS, [8]),
+        ("Seen(a, b, c=c, **rest)\nPair(*row)\nPair._make(row)\nprint(*row)\nf(*row)(1)", []),
+    ],
+)
+def test_a_record_filled_by_place_is_seen(text: str, found: list[int]) -> None:
+    assert filled_by_place(text, {"Seen", "Mode"}) == found
+
+
+def test_records_of_many_fields_are_filled_by_name() -> None:
+    texts = {path: path.read_text() for path in PACKAGE.rglob("*.py")}
+    records = {name for text in texts.values() for name in large_records(text)}
+    found = [
+        f"{path.relative_to(ROOT)}:{line}"
+        for path, text in texts.items()
+        for line in filled_by_place(text, records)
+    ]
+    assert len(records) > 100
     assert not found

@@ -83,8 +83,14 @@ def over_time(history: History, system: System) -> OverTime | None:
         if is_loud:
             part = [*places]
             most = max(part, key=lambda place: float(swing[place]))
-            loudest = peaks[most], float(amplitude[most]), float(speed[most])
-            vibrations.append(Vibration(float(edges[part[0]]), float(edges[part[-1] + 1]), *loudest))
+            found = Vibration(
+                start=float(edges[part[0]]),
+                end=float(edges[part[-1] + 1]),
+                frequency=peaks[most],
+                amplitude=float(amplitude[most]),
+                speed=float(speed[most]),
+            )
+            vibrations.append(found)
     torque = system.radius * friction
     return OverTime(middles, speed, load, tones, amplitude, stick, torque, lines, shown, vibrations)
 

@@ -147,7 +147,10 @@ class Answers:
         if self.bases:
             return united([part for each in self.bases for part in stable_parts(each)])
         spans = stable_spans(self.explored.slides, self.explored.changes)
-        return [Part(Bound(*low), Bound(*high), 0.0) for low, high in spans]
+        return [
+            Part(Bound(low, error=low_error), Bound(high, error=high_error), 0.0)
+            for (low, low_error), (high, high_error) in spans
+        ]
 
     @cached_property
     def _edges(self) -> list[list[Bound]]:

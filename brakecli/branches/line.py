@@ -162,8 +162,9 @@ class Line:
         """
         if self._table is None:
             return Shoe.of(self.system(p))
-        row = _interpolated(self._table, p).tolist()
-        return Shoe(Coefficients(*row[:-3]), *row[-3:])
+        *constants, stiffness, belt, load = _interpolated(self._table, p).tolist()
+        coefficients = Coefficients(**dict(zip(Coefficients._fields, constants, strict=True)))
+        return Shoe(coefficients=coefficients, stiffness=stiffness, belt=belt, load=load)
 
     @cached_property
     def _table(self) -> Floats | None:
@@ -171,13 +172,18 @@ class Line:
         between = 0.5 * (_PLACES[1:] + _PLACES[:-1])[:: NODES // 6]
         try:
             table, exact = (
-                np.array([[*shoe.coefficients, *shoe[1:]] for shoe in map(Shoe.of, map(self.system, where))])
+                np.array([_row(Shoe.of(self.system(p))) for p in where])
                 for where in (_PLACES.tolist(), between.tolist())
             )
         except CaseError:
             return None
         found = np.array([_interpolated(table, p) for p in between.tolist()])
         return table if np.all(np.abs(found - exact) <= EXACT * np.abs(table).max(axis=0)) else None
+
+
+def _row(shoe: Shoe) -> list[float]:
+    """A row of the table of numbers."""
+    return [*shoe.coefficients, shoe.stiffness, shoe.belt, shoe.load]
 
 
 def _interpolated(table: Floats, p: float) -> Floats:

@@ -287,7 +287,14 @@ def errors(rows: Floats, reference: Floats) -> Errors:
         scale = float(np.abs(exact).max()) or 1.0
         largest[name] = float(apart.max()) / scale
         mean[name] = float(apart.mean()) / scale
-    return Errors(max(largest[name] for name in MOTION), largest, mean, *_line(*columns["vx"]))
+    amplitude, phase = _line(*columns["vx"])
+    return Errors(
+        error=max(largest[name] for name in MOTION),
+        largest=largest,
+        mean=mean,
+        amplitude=amplitude,
+        phase=phase,
+    )
 
 
 def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None]:

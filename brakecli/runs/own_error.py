@@ -130,10 +130,18 @@ def promised(
     method = rung.method
     with_nodes = f" and {rung.nodes} nodes" if rung.nodes else ""
     steps_of = f"to {method.tolerance:.0e}" if method.own_steps else f"of {rung.step:.3g} s"
-    how = f"the error that is carried along with steps {steps_of}{with_nodes}"
     assert motion.own is not None
-    apart = safety * steps, safety * by_nodes, motion.own.amplification
-    return Certified(motion, Certificate(wanted, certified, error, until if not failed else 0.0, how, *apart))
+    certificate = Certificate(
+        tolerance=wanted,
+        certified=certified,
+        estimated_error=error,
+        certified_until=until if not failed else 0.0,
+        method=f"the error that is carried along with steps {steps_of}{with_nodes}",
+        by_steps=safety * steps,
+        by_nodes=safety * by_nodes,
+        amplification=motion.own.amplification,
+    )
+    return Certified(motion, certificate)
 
 
 def _finer(system: System, rung: System, steps: float, by_nodes: float) -> System | None:

@@ -122,8 +122,20 @@ def run(
             warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.notes.values())
             if loaded.case.output.events and motion.track is not None:
                 warnings += _write_events(result, motion.track)
-            shown = changing, top, warnings, *modelled(motion)
-            report = RunReport(loaded, output, verdict, motion, found, certificate, *shown)
+            used, left_out = modelled(motion)
+            report = RunReport(
+                loaded=loaded,
+                output=output,
+                verdict=verdict,
+                motion=motion,
+                check=found,
+                certificate=certificate,
+                over_time=changing,
+                spectrum_peak=top,
+                warnings=warnings,
+                modelled=used,
+                left_out=left_out,
+            )
             result.set_attributes(origin("run", report.title, loaded))
             result.set_fields(fields.RUN, report.numbers())
             if len(motion.work.unconverged):

@@ -42,8 +42,14 @@ def without_waves(system: System, state: Floats) -> Continued:
     if end.orbit is None or end.rate is None or is_undamped(flat.coefficients):  # then none is sure to stay
         return Continued(Fate.LASTS if end.lasts else Fate.DIES)
     orbit = end.orbit
-    numbers = orbit.amplitude, _level(flat, orbit), end.rate, orbit.period, float(orbit.word.count(STICK))
-    return Continued(Fate.LASTS, *numbers)
+    return Continued(
+        fate=Fate.LASTS,
+        amplitude=orbit.amplitude,
+        level=_level(flat, orbit),
+        rate=end.rate,
+        period=orbit.period,
+        sticks=float(orbit.word.count(STICK)),
+    )
 
 
 def _level(flat: System, orbit: Orbit) -> float:

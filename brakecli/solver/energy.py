@@ -1,7 +1,7 @@
 """The energy account of a run: what came in, what went out, what is stored, and what does not add up."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 from brakecli.solver.coefficients import Coefficients
@@ -65,11 +65,20 @@ def energy_at_level(c: Coefficients, s: Weights, state: Any) -> Mechanical:
 
 def account(start: tuple[float, float, float], end: tuple[float, float, float], work: Any) -> EnergyAccount:
     """The account between two states, each as energies (kinetic, links, contact), from the works in between."""
-    changes = [after - before for before, after in zip(start, end, strict=True)]
-    passed = [float(work[name]) for name in ("belt", "friction", "dashpots", "load", "roughness", "scheme")]
-    items = [*changes, *passed, max(sum(start), sum(end))]
-    return EnergyAccount(*items)
+    kinetic, links, contact = (after - before for before, after in zip(start, end, strict=True))
+    return EnergyAccount(
+        kinetic=kinetic,
+        links=links,
+        contact=contact,
+        belt=float(work["belt"]),
+        friction=float(work["friction"]),
+        dashpots=float(work["dashpots"]),
+        load=float(work["load"]),
+        roughness=float(work["roughness"]),
+        scheme=float(work["scheme"]),
+        stored=max(sum(start), sum(end)),
+    )
 
 
-NOT_KEPT = EnergyAccount(*[math.nan] * 10)
+NOT_KEPT = EnergyAccount(**{each.name: math.nan for each in fields(EnergyAccount)})
 """Account of a run that keeps none: all entries are NaN."""

@@ -61,8 +61,8 @@ def fits(system: System) -> Hashable | None:
 
 
 @lru_cache(maxsize=4)
-def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[Any, ...]:
-    """What `Shared` holds from `length` to `table`, for an even number of nodes."""
+def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> dict[str, Any]:
+    """What `Shared` holds of the surfaces, by its names, for an even number of nodes."""
     pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
     half = nodes // 2
     waves = np.zeros((WAVES, 3))
@@ -78,8 +78,14 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
     table[:, 1] = f1[: -half - 1 : -1]
     for wave, function in np.ndindex(own, 2):
         table[:, 2 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + half]
-    heights = (float(pad[name]) for name in ("full_up_to", "clear_from", "shoe_mean"))
-    return 2.0 * half_length, *heights, waves.ravel(), table.ravel()
+    return {
+        "length": 2.0 * half_length,
+        "full_up_to": float(pad.full_up_to),
+        "clear_from": float(pad.clear_from),
+        "shoe_mean": float(pad.shoe_mean),
+        "waves": waves.ravel(),
+        "table": table.ravel(),
+    }
 
 
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
@@ -125,16 +131,23 @@ def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
 
 def shared(system: System, first: int, beyond: int) -> Shared:
     """What a system has in common with others beside it, where the kinds from `first` on are carried along."""
-    grid = system.step, system.interval, system.per_sample, system.nodes
-    surfaces = _tables(system.half_length, system.shoe, system.wheel, system.nodes)
-    gaps = aligned(PAIR * (system.nodes // 2 + 3))
-    signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
-    return Shared._make((*grid, *surfaces, gaps, signals, first, beyond))
+    return Shared(
+        h=system.step,
+        interval=system.interval,
+        per_sample=system.per_sample,
+        nodes=system.nodes,
+        **_tables(system.half_length, system.shoe, system.wheel, system.nodes),
+        gaps=aligned(PAIR * (system.nodes // 2 + 3)),
+        signals=np.frombuffer(stop.memory, np.uint8).ctypes.data,
+        first=first,
+        beyond=beyond,
+    )
 
 
 def filled(systems: Sequence[System]) -> Any:
     """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
-    c = Coefficients(*np.array([each.coefficients for each in systems]).T)
+    columns = np.array([each.coefficients for each in systems]).T
+    c = Coefficients(**dict(zip(Coefficients._fields, columns, strict=True)))
     start = np.array([_start(each) for each in systems]).T
     h = systems[0].step
     wheel = systems[0].wheel

@@ -15,7 +15,21 @@ def coefficients(
     """Coefficients for link 1 at `beta_deg` to the vertical and link 2 at `alpha_deg` to the friction plane."""
     beta = sin_cos(beta_deg)
     alpha = sin_cos(alpha_deg)
-    return Coefficients(mass, *tensor(b_1, b_2, beta, alpha), *tensor(c_1, c_2, beta, alpha), *beta, phi)
+    b_xx, b_xy, b_yy = tensor(b_1, b_2, beta, alpha)
+    c_xx, c_xy, c_yy = tensor(c_1, c_2, beta, alpha)
+    sin_beta, cos_beta = beta
+    return Coefficients(
+        m=mass,
+        b_xx=b_xx,
+        b_xy=b_xy,
+        b_yy=b_yy,
+        c_xx=c_xx,
+        c_xy=c_xy,
+        c_yy=c_yy,
+        sin_beta=sin_beta,
+        cos_beta=cos_beta,
+        phi=phi,
+    )
 
 
 def tensor(one: Any, two: Any, beta: Pair, alpha: Pair) -> tuple[Any, Any, Any]:

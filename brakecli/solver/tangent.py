@@ -18,6 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import float64, int64, void
 
+from brakecli.solver.alike import by_rows
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, TANGENT_TYPE, Beside
@@ -78,7 +79,8 @@ def exponents(logs: Floats, duration: float) -> list[Exponent]:
     apart = (rest**2).sum(axis=0) * (places @ places) / (len(lined) - 2)
     alike = ((places[:, None] * rest).reshape(-1, ALIKE, rest.shape[1]).sum(axis=1) ** 2).sum(axis=0)
     off = np.sqrt(np.maximum(apart, alike)) / (places @ places)
-    return [Exponent(*each) for each in np.stack([rates.mean(axis=0), errors, slopes, off], axis=1).tolist()]
+    columns = {"rate": rates.mean(axis=0), "error": errors, "even": slopes, "even_error": off}
+    return [Exponent(**row) for row in by_rows(columns)]
 
 
 def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:

@@ -81,7 +81,7 @@ class Track:
     def powers(self, begin: float, end: float) -> Powers:
         """Mean powers between the marks nearest to two times (s), one part at least; NaN without any part."""
         if len(self.times) < 2:
-            return Powers(*[math.nan] * len(Powers._fields))
+            return Powers(**dict.fromkeys(Powers._fields, math.nan))
         first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
         last = max(int(np.abs(self.times - end).argmin()), first + 1)
         span = float(self.times[last] - self.times[first])

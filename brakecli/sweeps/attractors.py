@@ -71,12 +71,20 @@ class Attractors:
         for number in range(1, int(told.max(initial=0)) + 1):
             chosen = told == number
             here = numbers == number
-            amplitude, frequency, *parts = np.median(values[:, chosen], axis=1).tolist()
+            amplitude, frequency, stick, loss = np.median(values[:, chosen], axis=1).tolist()
             share = Probability.within(here.reshape(1, -1), ~known.reshape(1, -1))
-            words = (_most(regime[here]), _most(excitation[here]))
-            count = int(here.sum())
-            tone = frequency if frequency > 0.0 else None
-            found.append(Attractor(number, *words, count, share, amplitude, tone, *parts))
+            attractor = Attractor(
+                attractor=number,
+                regime=_most(regime[here]),
+                excitation=_most(excitation[here]),
+                points=int(here.sum()),
+                share=share,
+                amplitude=amplitude,
+                frequency=frequency if frequency > 0.0 else None,
+                stick_fraction=stick,
+                contact_loss_fraction=loss,
+            )
+            found.append(attractor)
             if np.ptp(apart[:, chosen], axis=1).max() > 2.0:
                 low = values[0, chosen].min()
                 high = values[0, chosen].max()

@@ -131,18 +131,23 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         answers = answers._replace(to_limit=theory.seconds_to_limit(end, last))
     decision = decide(answers, Thresholds())
     evidence = {"row": decision.row, "growth": theory.mode.growth}
-    numbers = (0.0, 0.0, force, system.radius * force)
-    left = math.exp(theory.mode.growth * (end - o.time))
-    kept: dict[str, Any] = {"evidence": evidence, "left": left}
+    numbers: dict[str, Any] = {
+        "stick_fraction": 0.0,
+        "contact_loss_fraction": 0.0,
+        "mean_friction_force": force,
+        "braking_torque": system.radius * force,
+        "settled_from": start,
+        "settled": False,
+        "evidence": evidence,
+        "left": math.exp(theory.mode.growth * (end - o.time)),
+    }
     if decision.regime is not Regime.DAMPED:
-        return Verdict(decision, amplitude(start, end), *numbers, start, False, **kept), last.tolist()
+        return Verdict(decision, amplitude(start, end), **numbers), last.tolist()
     first, late = (place * system.interval for place in tenths(system.samples + 1))
     first -= system.interval  # its last sample
     before = _swung(system, theory, min(o.time, first))
     early = amplitude(o.time, first, *before) if o.time < first else 0.5 * (before[1] - before[0])
-    return Verdict(
-        decision, amplitude(late, end), *numbers, start, False, amplitude_first=early, **kept
-    ), last.tolist()
+    return Verdict(decision, amplitude(late, end), amplitude_first=early, **numbers), last.tolist()
 
 
 def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float]:
@@ -207,6 +212,15 @@ def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, 
         samples_per_cycle=period / interval,
     )
     decision = decide(answers, Thresholds())._replace(frequency=orbit.frequency)
-    numbers = orbit.amplitude, orbit.stick_fraction, orbit.contact_loss_fraction, force, system.radius * force
-    evidence = {"row": decision.row, "rate_without_waves": rate, "largest_multiplier": factor}
-    return Verdict(decision, *numbers, start, True, evidence), list(orbit.state)
+    verdict = Verdict(
+        decision=decision,
+        amplitude=orbit.amplitude,
+        stick_fraction=orbit.stick_fraction,
+        contact_loss_fraction=orbit.contact_loss_fraction,
+        mean_friction_force=force,
+        braking_torque=system.radius * force,
+        settled_from=start,
+        settled=True,
+        evidence={"row": decision.row, "rate_without_waves": rate, "largest_multiplier": factor},
+    )
+    return verdict, list(orbit.state)

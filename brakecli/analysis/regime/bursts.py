@@ -98,9 +98,12 @@ def _burst(values: Array, interval: float, size: int, group: list[tuple[int, flo
     if (last - first) * frequency < _CYCLES / 2:
         return None
     turn = np.angle(np.vdot(tone[first : last - 1], tone[first + 1 : last]))
-    level = float(np.sqrt(0.5 * np.mean(amplitude[first:last] ** 2)))
-    times = (low + first) * interval, (low + last) * interval
-    return Burst(*times, float(turn) / (2.0 * np.pi * interval), level)
+    return Burst(
+        start=(low + first) * interval,
+        end=(low + last) * interval,
+        frequency=float(turn) / (2.0 * np.pi * interval),
+        level=float(np.sqrt(0.5 * np.mean(amplitude[first:last] ** 2))),
+    )
 
 
 def _edge(amplitude: Array) -> int:

@@ -12,7 +12,7 @@ from brakecli.analysis.regime.evidence import LAST, WINDOWS, Part, trend
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear, force_parts, parts
-from brakecli.solver.alike import at_once
+from brakecli.solver.alike import at_once, by_rows
 from brakecli.solver.history import stacked
 
 RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
@@ -104,7 +104,8 @@ def _gone(shown: Sequence[Shown], decays: Sequence[float], own: Array, forced: A
     level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, _ABOVE * end), within * forced)
     late = (left > level[:, None])[:, ::-1]
     window = np.where(late.any(axis=1), WINDOWS - late.argmax(axis=1), 1)
-    return [_Gone(*row) for row in zip(*(each.tolist() for each in (window, level, end, stays)), strict=True)]
+    columns = {"window": window, "level": level, "end": end, "stays": stays}
+    return [_Gone(**row) for row in by_rows(columns)]
 
 
 def _closed(shown: Shown, theory: Linear, decay: float, forced: float, gone: _Gone) -> Lasting | None:

@@ -21,7 +21,7 @@ from brakecli.analysis.regime.evidence import (
     tenths,
 )
 from brakecli.analysis.spectrum import Array
-from brakecli.solver.alike import at_once
+from brakecli.solver.alike import at_once, by_rows
 from brakecli.solver.history import History, stacked
 
 _ALIKE = 0.4  # bounds of x over the level of vx, by how far they may leave their final values; a choice
@@ -50,33 +50,41 @@ def seen(histories: Sequence[History], within: float) -> list[Seen]:
 
     def of_those(places: list[int]) -> list[Seen]:
         columns = _columns(stacked([histories[i] for i in places]), within)
-        return [Seen(*row) for row in zip(*(each.tolist() for each in columns), strict=True)]
+        return [Seen(**row) for row in by_rows(columns)]
 
     return at_once([(each.interval, each.samples) for each in histories], of_those)
 
 
-def _columns(history: History, within: float) -> list[NDArray[Any]]:
-    """The numbers of `Seen`, of each of many histories."""
+def _columns(history: History, within: float) -> dict[str, NDArray[Any]]:
+    """The numbers of `Seen` by their names, of each of many histories."""
     samples = history.samples
     first, last = tenths(samples)
     whole = Part(history, 0, samples)
     state = history.read("state", samples - 1, samples)
     quarter = Part(history, last_quarter(samples), samples)
-    parts = Part(history, 0, first), Part(history, last, samples), Part(history, samples // 2, samples), quarter
-    columns = [
-        state[:, 0],
-        whole.since("state", lambda values: values == state),
-        whole.since("contact_fraction", lambda values: values >= FULL),
-        *(each.amplitude("x") for each in parts),
-        quarter.deviation("vx"),
-    ]
+    columns = {
+        "state": state[:, 0],
+        "state_from": whole.since("state", lambda values: values == state),
+        "full_from": whole.since("contact_fraction", lambda values: values >= FULL),
+        "first": Part(history, 0, first).amplitude("x"),
+        "final": Part(history, last, samples).amplitude("x"),
+        "swing": Part(history, samples // 2, samples).amplitude("x"),
+        "amplitude": quarter.amplitude("x"),
+        "level": quarter.deviation("vx"),
+    }
     if samples < FEWEST_SAMPLES:
         return columns
     vx, least, largest = _windowed(history)
     final = _final(vx)
     window = _settled_window((vx, least, largest), within, _ALIKE * within)
-    columns += [*level_change(vx[:, WINDOWS // 2 :]), final, vx.max(axis=1), window * samples // WINDOWS]
-    return columns
+    change, change_error = level_change(vx[:, WINDOWS // 2 :])
+    return columns | {
+        "change": change,
+        "change_error": change_error,
+        "final_level": final,
+        "largest_level": vx.max(axis=1),
+        "settled_from": window * samples // WINDOWS,
+    }
 
 
 @lru_cache(maxsize=4)

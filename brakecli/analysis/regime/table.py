@@ -27,8 +27,6 @@ from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Row,
 from brakecli.analysis.regime.looks import LOOKS
 
 _DAMPED = Regime.DAMPED
-_FORCED = (Regime.DAMPED, Excitation.FORCED)
-_OWN = Regime.UNDECIDED, Excitation.SELF_EXCITED  # how it looks, `LOOKS` decides
 _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
@@ -174,22 +172,22 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
         "lasts",
         lambda a, t: a.without_waves == Fate.LASTS and same(a, t),
         "the vibration lasts[: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m]",
-        "",
-        *_OWN,
+        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "on its way",
         lambda a, t: a.without_waves == Fate.LASTS and math.isfinite(a.amplitude_without_waves),
         "the vibration lasts, and is still on its way to an amplitude of {a.amplitude_without_waves:.3g} m",
-        "",
-        *_OWN,
+        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "lasts, irregular",
         lambda a, t: a.without_waves == Fate.LASTS and steady(a, t),
         "the vibration lasts, as sliding is unstable, and its level does not change",
-        "",
-        *_OWN,
+        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        excitation=Excitation.SELF_EXCITED,
     ),
     COMES_AND_GOES,
     Row(
@@ -213,8 +211,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "linear, forced",
         lambda a, t: a.linear and decays(a, t) and not a.undamped,
         "only the roughness shakes the shoe: " + _DECAYS,
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     _GROWS,
     Row(
@@ -228,8 +226,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "forced, no friction",
         lambda a, t: a.frictionless and not a.undamped,
         "only the roughness shakes the shoe: without friction nothing else excites it",
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     _NO_DASHPOTS,
     Row(
@@ -243,8 +241,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         lambda a, t: a.without_waves == Fate.DIES and together(a, t),
         "only the roughness shakes the shoe: without it the vibration dies out, and small disturbances "
         "have a growth rate of {a.exponent:.3g} 1/s",
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     Row(
         "forced, level",
@@ -255,8 +253,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and not a.undamped
         ),
         "only the roughness shakes the shoe: without it the vibration dies out, and its level does not grow",
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     Row(
         "forced, friction takes",
@@ -268,16 +266,16 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         ),
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, and friction takes "
         "{a.taken:.2g} W from the vibration",
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     Row(
         "forced, roughness gives",
         lambda a, t: together(a, t) and steady(a, t) and roughness_gives_most(a, t) and not a.undamped,
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
         "{a.power_of_friction:.2g} W, and small disturbances have a growth rate of {a.exponent:.3g} 1/s",
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     Row(
         "forced, another level",
@@ -285,8 +283,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "only the roughness shakes the shoe: small disturbances have a growth rate of {a.exponent:.3g} 1/s, and "
         "vx has {a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the "
         "roughness",
-        "",
-        *_FORCED,
+        regime=Regime.DAMPED,
+        excitation=Excitation.FORCED,
     ),
     Row(
         "dies out, not yet",
@@ -312,8 +310,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and not a.undamped
         ),
         "the vibration lasts without the roughness, with a phase of its own",
-        "",
-        *_OWN,
+        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "locked to the waves",
@@ -325,8 +323,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and friction_gives_most(a, t)
         ),
         "the vibration lasts without the roughness at the same level, and is locked to it",
-        "",
-        *_OWN,
+        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "kept up by friction",
@@ -339,8 +337,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         ),
         "the vibration lasts without the roughness, and of its power friction gives "
         "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W",
-        "",
-        *_OWN,
+        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        excitation=Excitation.SELF_EXCITED,
     ),
     COMES_AND_GOES,
     Row(

@@ -260,7 +260,8 @@ class _Modes(NamedTuple):
 
 def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
     """The theories of systems with as many waves."""
-    c: Any = Coefficients(*np.array([each.coefficients for each in systems]).T)
+    columns = np.array([each.coefficients for each in systems]).T
+    c: Any = Coefficients(**dict(zip(Coefficients._fields, columns, strict=True)))
     stiffness, load = np.array([(each.contact_stiffness, each.load_at_start) for each in systems]).T
     heights, forces = (np.array(each) for each in zip(*map(_pushes, systems), strict=True))
     wheels = np.array([(each.wheel.omega, each.wheel.phase, each.wheel.turns) for each in systems])

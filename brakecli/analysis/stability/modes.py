@@ -140,9 +140,13 @@ def _mode(value: Any, vector: Complex) -> Mode:
     value += 0.0  # without -0
     moves = abs(vector[0]) > _MOVES * abs(vector[1])
     ratio = vector[1] / vector[0] if moves else 0.0
-    shape = (float(abs(ratio)), float(np.degrees(np.angle(ratio)))) if moves else (None, None)
-    damping_ratio = float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0
-    return Mode(float(value.real), float(value.imag / (2.0 * math.pi)), damping_ratio, *shape)
+    return Mode(
+        growth=float(value.real),
+        frequency=float(value.imag / (2.0 * math.pi)),
+        damping_ratio=float(-value.real / abs(value)) + 0.0 if value != 0.0 else 0.0,
+        shape=float(abs(ratio)) if moves else None,
+        shape_phase=float(np.degrees(np.angle(ratio))) if moves else None,
+    )
 
 
 def routh_hurwitz(m: Any, b: Tensor, c: Tensor, k: Any, grip: Any, *, damped: bool) -> list[Any]:

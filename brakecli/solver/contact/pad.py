@@ -70,7 +70,7 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad.shoe_terms = shoe.g.size
     pad.wheel_terms = wheel.g.size
     pad.signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
-    top, bottom = _shoe_bounds(half_length, *(each.tobytes() for each in shoe))
+    top, bottom = _shoe_bounds(half_length, shoe)
     pad.shoe_bound = max(top, bottom)
     pad.wheel_bound = np.abs(wheel.g).sum()
     pad.full_up_to = -pad.wheel_bound - top
@@ -182,12 +182,11 @@ def aligned(size: int) -> Floats:
 
 
 @lru_cache(maxsize=64)
-def _shoe_bounds(a: float, *profile: bytes) -> tuple[float, float]:
+def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
     """Upper bounds (m) of f1 and of -f1 on the pad: a fine grid and what curvature can add between its points.
 
     They take as long as a short run, and are those of other nodes as well.
     """
-    shoe = Surface(*(np.frombuffer(each) for each in profile))
     if shoe.g.size == 0:
         return 0.0, 0.0
     xi = np.linspace(

@@ -148,9 +148,10 @@ SCHEMES: dict[str, Scheme] = {
 
 
 def load(name: str) -> SchemeModule:
-    """The module of a scheme; its kernels are compiled on the first call of a new version."""
+    """The module of a scheme; its kernels are loaded before anything is timed."""
     from brakecli.solver.compile import ready
 
     module = cast(SchemeModule, import_module(SCHEMES[name].module))
     ready(module.advance)
+    ready(getattr(module, "solve", module.advance))  # that of a scheme which finds its steps itself
     return module

@@ -162,7 +162,8 @@ class ClusterEngine(Engine):
         try:
             from distributed import Client
         except ImportError as error:
-            what = "needs dask.distributed, which is not installed; install it with: python -m pip install distributed"
+            what = "needs dask.distributed, which is not installed"
+            what += "; install it with: python -m pip install distributed"
             raise UsageError(f"{self._where}: {what}") from error
 
         for name in {*NOISY, *logging.root.manager.loggerDict}:  # dask has given its loggers levels of their own

@@ -145,9 +145,13 @@ class RoughFlow:
             (float(f["least_x"]), float(f["most_x"])),
             (float(f["least_y"]), float(f["most_y"])),
             Margins(
-                *(float(f[name]) for name in ("least_slide", "least_hold", "least_pass")),
-                *(float(f[name]) for name in ("least_contact", "most_contact")),
-                *(float(f[name]) / span for name in ("open", "stuck")),
+                slide=float(f["least_slide"]),
+                hold=float(f["least_hold"]),
+                pass_by=float(f["least_pass"]),
+                contact=float(f["least_contact"]),
+                most_contact=float(f["most_contact"]),
+                open_share=float(f["open"]) / span,
+                stick_share=float(f["stuck"]) / span,
             ),
         )
 

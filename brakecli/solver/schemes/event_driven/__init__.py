@@ -8,7 +8,7 @@ from numba import float64, int64, void
 
 from brakecli.solver import own_steps
 from brakecli.solver.automaton import CONE, OPEN, STICK, side_of
-from brakecli.solver.compile import Floats, address, at_address, from_memory, into_memory, kernel
+from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.friction import observed
@@ -36,7 +36,6 @@ hold = into_memory(_PLANT)
 _plant_at = from_memory(_PLANT)
 _evaluate_at = at_address(EVALUATE)
 _step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
-address(solve)  # compiled here, like all other kernels of a run: before anything is timed
 
 _BUDGET = 4096
 _EXACT = 64
