@@ -198,8 +198,18 @@ def _is_alone() -> bool:
     return bool(select.select([sys.stdin], [], [], 0.0)[0])
 
 
+def _in_turn(kernels: list[Any], k: int, count: int) -> list[Any]:
+    """All kernels in the order of a child: pairs of them come towards each other, so that none follows another.
+
+    A kernel that another child compiles is waited for; one who followed would wait all the time.
+    """
+    first = (k + k % 2) * len(kernels) // (count + count % 2)
+    way = -1 if k % 2 else 1
+    return (kernels[first:] + kernels[:first])[::way]
+
+
 def _child(folder: Path, k: int, count: int) -> None:
-    """Compile all kernels that no other child has compiled, beginning at a place of its own."""
+    """Compile all kernels that no other child has compiled, in an order of its own."""
     for module in pkgutil.walk_packages([str(_SOLVER)], "brakecli.solver."):
         importlib.import_module(module.name)
     from brakecli.solver.compile import is_kept, kernels, ready
@@ -209,8 +219,7 @@ def _child(folder: Path, k: int, count: int) -> None:
         raise SystemExit(f"the cache is {CACHE}, not {folder}")
     (folder / f"{_TOTAL}.{k}").write_text(str(len(kernels)))
     (folder / f"{_TOTAL}.{k}").replace(folder / _TOTAL)
-    first = k * len(kernels) // count
-    for each in kernels[first:] + kernels[:first]:
+    for each in _in_turn(kernels, k, count):
         if _is_alone():
             return
         if not is_kept(each):

@@ -172,6 +172,16 @@ def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
     assert made == [tmp_path]
 
 
+def test_children_come_towards_each_other() -> None:
+    kernels = [*range(8)]
+    assert [beforehand._in_turn(kernels, k, 2) for k in range(2)] == [kernels, kernels[::-1]]
+    orders = [beforehand._in_turn(kernels, k, 4) for k in range(4)]
+    assert [order[:3] for order in orders] == [[0, 1, 2], [3, 2, 1], [4, 5, 6], [7, 6, 5]]
+    assert all(sorted(order) == kernels for order in orders)
+    assert [beforehand._in_turn(kernels, k, 3)[0] for k in range(3)] == [0, 3, 4]
+    assert beforehand._in_turn(kernels, 0, 1) == kernels
+
+
 def child(folder: Path, cache: Path, stdin: int) -> subprocess.CompletedProcess[str]:
     changes: dict[str, str | None] = {"XDG_CACHE_HOME": str(cache), beforehand.VARIABLE: beforehand.CHILD}
     words = [sys.executable, "-P", "-m", beforehand.__name__, str(folder), "0", "1"]
