@@ -17,6 +17,7 @@ from brakecli.solver import implicit_step
 from brakecli.solver.compile import address
 from brakecli.solver.schemes import event_driven
 from tests.campaign import campaign
+from tests.commands import environment
 
 COUNT = """
 import resource, signal
@@ -178,6 +179,36 @@ print(hashlib.sha256(compute_units(plan, 0, plan.points)).hexdigest())
 def test_a_process_that_compiles_computes_the_bytes_of_one_that_loads(tmp_path: Path) -> None:
     one, other = (python(RECORDS.replace("FOLDER", str(tmp_path)), tmp_path / "cache") for _ in range(2))
     assert one == other
+
+
+IN_ORDER = """
+import importlib, pkgutil, random
+import brakecli.solver
+for module in pkgutil.walk_packages(brakecli.solver.__path__, "brakecli.solver."):
+    importlib.import_module(module.name)
+from brakecli.solver.compile import kernels, ready
+order = [*kernels]
+random.Random(SEED).shuffle(order) if SEED else order.reverse()
+for each in order:
+    ready(each)
+assert len(order) > 200
+"""
+
+
+@campaign
+@pytest.mark.usefixtures("compiled")
+def test_the_order_in_which_kernels_are_loaded_changes_no_byte(tmp_path: Path) -> None:
+    """One that was linked with another's copy of what both call would give other last digits."""
+    records = RECORDS.replace("FOLDER", str(tmp_path))
+    programs = [records, *(IN_ORDER.replace("SEED", str(seed)) + records for seed in (0, 1, 2))]
+    found = {
+        subprocess.run(
+            [sys.executable, "-c", program], env=environment(), capture_output=True, text=True, check=True
+        ).stdout
+        for program in programs
+    }
+    assert len(found) == 1
+    assert len(found.pop()) == 65
 
 
 def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> None:
