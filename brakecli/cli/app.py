@@ -107,6 +107,7 @@ def _common(
 ) -> None:
     compiling.set_notice(announce_compilation)
     compiling.set_progress(showing_compilation)
+    compiling.set_warning(warn)
     readings.begin(warn)
     context.call_on_close(readings.begin)  # a later call of the same process forgets what this one has read
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)

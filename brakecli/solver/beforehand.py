@@ -11,16 +11,17 @@ import json
 import os
 import pkgutil
 import resource
-import select
+import shutil
 import subprocess
 import sys
 import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
+from threading import Thread
 from typing import IO, Any
 
-from brakecli.solver import compiling
+from brakecli.solver import cache_folder, compiling
 
 VARIABLE = "BRAKECLI_COMPILE"
 """The environment variable that says how kernels are compiled."""
@@ -34,10 +35,19 @@ ROOM = 200e6
 MOST_CHILDREN = 8
 PROCESSOR_SECONDS = 120.0
 """Time (s) that one core takes for all kernels, about."""
+REMEDY = "name a folder of your own with XDG_CACHE_HOME"
+_LARGEST = 1_000_000  # bytes of a manifest
 _TOTAL = "total"
 _LOCK = "beforehand.lock"
 _PAUSE = 0.2  # s between two looks how far the children are
 _SOLVER = Path(__file__).parent
+_START = """
+import json, sys
+sys.path[:] = json.loads(sys.argv[1])
+from brakecli.solver.beforehand import child
+child(*sys.argv[2:])
+"""
+"""What a child runs, in an interpreter that imports nothing but from the places that this process knows."""
 
 
 def is_lazy() -> bool:
@@ -62,30 +72,48 @@ def prepare(folder: Path, facts: dict[str, str]) -> str:
 
     Returns what keeps them from it, as a sentence without its full stop, or an empty text.
     """
+    if (asked := os.environ.get(VARIABLE)) not in (None, "", LAZY, CHILD):
+        compiling.warn(f"{VARIABLE}: unknown value (found {asked!r}); it may be {LAZY!r}")
     if is_lazy() or is_child() or _fits(folder, facts):
         return ""
-    if hindrance := _hindrance(folder):
-        return hindrance
     try:
-        with (folder / _LOCK).open("w") as lock, compiling.progress(_expected()) as tell:
-            while not _is_ours(lock):  # another process makes them
+        folder.mkdir(mode=cache_folder.OURS, parents=True, exist_ok=True)
+        if hindrance := _hindrance(folder):
+            return hindrance
+        with cache_folder.opened_lock(folder / _LOCK) as lock:
+            return _made(folder, facts, lock)
+    except OSError as error:
+        what = f"the kernels cannot be compiled beforehand: {(error.strerror or str(error)).lower()}"
+        return f"{what} (found {error.filename or folder}); {REMEDY}"
+
+
+def _made(folder: Path, facts: dict[str, str], lock: IO[str]) -> str:
+    """Have all kernels compiled, or wait until another process has done so; why they are not, or an empty text."""
+    waits = not _is_ours(lock)
+    if not waits and _fits(folder, facts):  # another process has just made them
+        return ""
+    if not waits:
+        _wipe(folder)
+    with compiling.progress(PROCESSOR_SECONDS / min(cores(), MOST_CHILDREN)) as tell:
+        if waits:
+            while not _is_ours(lock):
                 tell(*_come(folder))
                 time.sleep(_PAUSE)
             if _fits(folder, facts):
                 return ""
             _wipe(folder)
-            if why := _compiled(folder, tell):
-                return why
-            _write_manifest(folder, facts)
-    except OSError as error:
-        return f"the kernels cannot be compiled beforehand: {error.strerror or error}"
-    return ""
+        why = _compiled(folder, tell)
+        if not why:
+            files = {str(path.relative_to(folder)): path.stat().st_size for path in sorted(folder.rglob("*.nb?"))}
+            manifest = {"facts": facts, "sources": _stamps(), "files": files}
+            _write(folder / MANIFEST, json.dumps(manifest, indent=1))
+        return why
 
 
 def names(folder: Path, file: Path) -> bool:
     """Whether the manifest says that a file is there."""
-    with suppress(OSError, ValueError, LookupError):
-        return str(file.relative_to(folder)) in json.loads((folder / MANIFEST).read_bytes())["files"]
+    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
+        return str(file.relative_to(folder)) in _manifest(folder)["files"]
     return False
 
 
@@ -94,43 +122,44 @@ def forget(folder: Path) -> None:
     (folder / MANIFEST).unlink(missing_ok=True)
 
 
-def _expected() -> float:
-    """Seconds that it takes on this machine, about."""
-    return PROCESSOR_SECONDS / min(cores(), MOST_CHILDREN)
-
-
 def _stamps() -> dict[str, list[int]]:
     """Time and size of each source: Numba compares them."""
     found = {str(path.relative_to(_SOLVER)): path.stat() for path in sorted(_SOLVER.rglob("*.py"))}
     return {name: [status.st_mtime_ns, status.st_size] for name, status in found.items()}
 
 
+def _manifest(folder: Path) -> Any:
+    return json.loads(cache_folder.read(folder / MANIFEST, _LARGEST))
+
+
 def _fits(folder: Path, facts: dict[str, str]) -> bool:
     """Whether the manifest says that all kernels are there, and they are."""
     try:
-        manifest: Any = json.loads((folder / MANIFEST).read_bytes())
-        made = manifest["facts"] == facts and manifest["sources"] == _stamps()
-        return made and all((folder / name).stat().st_size == size for name, size in manifest["files"].items())
-    except (OSError, ValueError, LookupError, TypeError, AttributeError):
+        manifest = _manifest(folder)
+        files = manifest["files"]
+        made = bool(files) and manifest["facts"] == facts and manifest["sources"] == _stamps()
+        return made and all((folder / name).lstat().st_size == size for name, size in files.items())
+    except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return False
 
 
-def _write_manifest(folder: Path, facts: dict[str, str]) -> None:
-    files = {str(path.relative_to(folder)): path.stat().st_size for path in sorted(folder.rglob("*.nb?"))}
-    text = json.dumps({"facts": facts, "sources": _stamps(), "files": files}, indent=1)
-    (folder / f"{MANIFEST}.new").write_text(text)
-    (folder / f"{MANIFEST}.new").replace(folder / MANIFEST)
+def _write(path: Path, text: str) -> None:
+    """Write a file completely or not at all."""
+    with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
+        file.write(text)
+    Path(file.name).replace(path)
 
 
 def _hindrance(folder: Path) -> str:
-    """Why children would not get far, or an empty text."""
+    """Why children would not get far, with the remedy, or an empty text."""
+    what = "the kernels are not compiled beforehand"
     if not sys.executable:
-        return "the kernels cannot be compiled beforehand: there is no interpreter to start"
+        return f"{what}: there is no interpreter to start; call brakecli once from a shell"
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
-        return "the kernels are not compiled beforehand: the address space is limited"
+        return f"{what}: the address space is limited; raise the limit with: ulimit -v unlimited"
     status = os.statvfs(folder)
     if status.f_bavail * status.f_frsize < ROOM:
-        return f"the kernels are not compiled beforehand: the disk of {folder} is nearly full"
+        return f"{what}: the disk is nearly full (found {folder}); free {ROOM / 1e6:.0f} MB there, or {REMEDY}"
     return ""
 
 
@@ -146,32 +175,58 @@ def _is_ours(lock: IO[str]) -> bool:
 
 
 def _wipe(folder: Path) -> None:
-    """Remove what does not fit."""
+    """Remove what does not fit, whatever it is."""
     for path in [folder / MANIFEST, folder / _TOTAL, *folder.rglob("*.nb?")]:
-        path.unlink(missing_ok=True)
+        if path.is_dir() and not path.is_symlink():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
 
 
 def _come(folder: Path) -> tuple[int, int]:
     """How many kernels are there, of how many; 0 where this is not known yet."""
     with suppress(OSError, ValueError):
-        return sum(1 for _ in folder.rglob("*.nbc")), int((folder / _TOTAL).read_text())
+        return sum(1 for _ in folder.rglob("*.nbc")), int(cache_folder.read(folder / _TOTAL, 20))
     return 0, 0
+
+
+def _places() -> list[str]:
+    """Where this process looks for modules, but for the current folder."""
+    try:
+        here = os.getcwd()  # noqa: PTH109 - pathlib's is the same
+    except OSError:
+        here = ""
+    found = [place for place in sys.path if place and os.path.isabs(place) and place != here]  # noqa: PTH117
+    root = str(_SOLVER.parent.parent)
+    return found if root in found else [*found, root]
 
 
 def _compiled(folder: Path, tell: compiling.Tell) -> str:
     """Have children compile all kernels; why they have not, or an empty text."""
     count = min(cores(), MOST_CHILDREN)
-    roots = [str(_SOLVER.parent.parent), *filter(None, [os.environ.get("PYTHONPATH")])]
-    environment = {**os.environ, VARIABLE: CHILD, "NUMBA_OPT": "1", "PYTHONPATH": os.pathsep.join(roots)}
+    environment = {**os.environ, VARIABLE: CHILD, "NUMBA_OPT": "1", cache_folder.BASE: str(folder.parent.parent)}
     children: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as said:
         try:
             for k in range(count):
-                # -P: nothing in the current folder is imported
-                words = [sys.executable, "-P", "-m", "brakecli.solver.beforehand", str(folder), str(k), str(count)]
+                words = [
+                    sys.executable,
+                    "-I",
+                    "-c",
+                    _START,
+                    json.dumps(_places()),
+                    str(folder),
+                    str(k),
+                    str(count),
+                ]
                 children.append(
                     subprocess.Popen(
-                        words, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=said, env=environment
+                        words,
+                        cwd=folder,
+                        stdin=subprocess.PIPE,
+                        stdout=subprocess.DEVNULL,
+                        stderr=said,
+                        env=environment,
                     )
                 )
             while any(child.poll() is None for child in children):
@@ -186,16 +241,23 @@ def _compiled(folder: Path, tell: compiling.Tell) -> str:
                     child.wait()
         done, total = _come(folder)
         tell(done, total)
-        if total and done >= total and not any(child.returncode for child in children):
+        if total and done >= total:
             return ""
         said.seek(0)
-        lines = said.read().decode(errors="replace").splitlines() or [f"{done} of {total} could be kept"]
-        return f"the kernels cannot be compiled beforehand: {lines[-1]}"
+        lines = said.read().decode(errors="replace").splitlines()
+    killed = [-child.returncode for child in children if child.returncode < 0]
+    if killed:
+        why = f"signal {killed[0]} has ended what compiles them, perhaps for lack of memory"
+    else:
+        why = lines[-1] if lines else f"{done} of {total} could be kept"
+    return f"the kernels cannot be compiled beforehand: {why} (found {folder}); {REMEDY}"
 
 
-def _is_alone() -> bool:
-    """Whether the process that has started this one has ended."""
-    return bool(select.select([sys.stdin], [], [], 0.0)[0])
+def _end_with_parent() -> None:
+    """End this process where the one that has started it has ended: its standard input is at its end then."""
+    while os.read(0, 1):
+        pass
+    os._exit(1)
 
 
 def _in_turn(kernels: list[Any], k: int, count: int) -> list[Any]:
@@ -208,23 +270,20 @@ def _in_turn(kernels: list[Any], k: int, count: int) -> list[Any]:
     return (kernels[first:] + kernels[:first])[::way]
 
 
-def _child(folder: Path, k: int, count: int) -> None:
+def child(where: str, k: str, count: str) -> None:
     """Compile all kernels that no other child has compiled, in an order of its own."""
+    Thread(target=_end_with_parent, daemon=True).start()
+    folder = Path(where)
     for module in pkgutil.walk_packages([str(_SOLVER)], "brakecli.solver."):
         importlib.import_module(module.name)
     from brakecli.solver.compile import is_kept, kernels, ready
     from brakecli.solver.kernel_cache import CACHE
 
     if folder != CACHE:
-        raise SystemExit(f"the cache is {CACHE}, not {folder}")
-    (folder / f"{_TOTAL}.{k}").write_text(str(len(kernels)))
-    (folder / f"{_TOTAL}.{k}").replace(folder / _TOTAL)
-    for each in _in_turn(kernels, k, count):
-        if _is_alone():
-            return
+        raise SystemExit(f"the cache is {CACHE}")
+    _write(folder / _TOTAL, str(len(kernels)))
+    for each in _in_turn(kernels, int(k), int(count)):
         if not is_kept(each):
             ready(each)
-
-
-if __name__ == "__main__":
-    _child(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]))
+            if not is_kept(each):
+                raise SystemExit("no more can be written there")

@@ -11,9 +11,10 @@ import os
 import pwd
 import stat
 from pathlib import Path
+from typing import IO
 
-TEMPORARY = "BRAKECLI_TEMPORARY_CACHE"
-"""The environment variable by which a process without a cache hands a temporary one to its workers."""
+BASE = "BRAKECLI_CACHES"
+"""The environment variable by which a process hands its folder of caches to those that it starts."""
 FOR_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permissions by which others write into a folder."""
 OURS = 0o700
@@ -31,7 +32,7 @@ def prepare(name: str = "") -> Path:
 
     Raises OSError where it cannot be made, and PermissionError where others could write there or swap it.
     """
-    named = os.environ.get(TEMPORARY) or os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
+    named = os.environ.get(BASE) or os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     base = Path(named) if named else Path.home() / ".cache"
     folder = base.absolute() / "brakecli" / f"{source_hash()}{name}"
     for each in [*reversed(folder.parents), folder]:
@@ -46,6 +47,25 @@ def prepare(name: str = "") -> Path:
     if found.st_uid != os.geteuid() or found.st_mode & FOR_OTHERS:
         raise _refused(folder, "it is not a folder in which this user alone writes")
     return real
+
+
+def read(path: Path, most: int) -> bytes:
+    """The contents of a file of the cache; raises OSError where it is no file, or longer than so many bytes."""
+    file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
+    with open(file, "rb") as opened:  # noqa: PTH123 - a descriptor
+        found = os.fstat(file)
+        if not stat.S_ISREG(found.st_mode) or found.st_size > most:
+            raise OSError(errno.EINVAL, "it is no file of the cache", str(path))
+        return opened.read()
+
+
+def opened_lock(path: Path) -> IO[str]:
+    """A file that holds nothing but locks; raises OSError where something else is in its place."""
+    file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600)
+    if not stat.S_ISREG(os.fstat(file).st_mode):
+        os.close(file)
+        raise OSError(errno.EINVAL, "it is no file", str(path))
+    return open(file, "r+")  # noqa: PTH123 - a descriptor
 
 
 def refuse_shared(folder: Path) -> None:

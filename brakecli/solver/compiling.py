@@ -10,6 +10,7 @@ Progress = Callable[[float], AbstractContextManager[Tell]]
 
 _notice: Callable[[str], object] | None = None
 _progress: Progress | None = None
+_warning: Callable[[str], object] | None = None
 _trouble = ""
 
 
@@ -31,6 +32,18 @@ def set_progress(progress: Progress | None) -> None:
 def progress(seconds: float) -> AbstractContextManager[Tell]:
     """What shows it, for something that takes about so many seconds."""
     return _progress(seconds) if _progress is not None else nullcontext(lambda done, total: None)
+
+
+def set_warning(warning: Callable[[str], object] | None) -> None:
+    """Have this process call `warning` with what keeps kernels from being compiled beforehand; None: silence."""
+    global _warning
+    _warning = warning
+
+
+def warn(text: str) -> None:
+    """Tell what keeps kernels from being compiled beforehand."""
+    if _warning is not None:
+        _warning(text)
 
 
 def set_trouble(text: str) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import llvmlite
 import numba
@@ -30,6 +30,20 @@ caching: Any = numba_caching  # has no types
 codegen: Any = numba_codegen  # has no types
 
 
+_TEMPORARY = "brakecli-kernels-"  # what the names of temporary caches begin with, before the process
+_STALE = 3600.0  # s
+_DECIDING = (
+    "NUMBA_CPU_NAME",
+    "NUMBA_CPU_FEATURES",
+    "NUMBA_ENABLE_AVX",
+    "NUMBA_BOUNDSCHECK",
+    "NUMBA_DEBUGINFO",
+    "NUMBA_LOOP_VECTORIZE",
+    "NUMBA_SLP_VECTORIZE",
+)
+"""Variables of the environment that decide what machine code Numba writes."""
+
+
 def _facts() -> dict[str, str]:
     """What kernels depend on beside their sources."""
     return {
@@ -38,7 +52,7 @@ def _facts() -> dict[str, str]:
         "llvmlite": llvmlite.__version__,
         "processor": f"{llvm.get_host_cpu_name()} {llvm.get_host_cpu_features().flatten()}",
         "path": str(Path(__file__).parent),
-        **{name: value for name, value in os.environ.items() if name.startswith("NUMBA_CPU_")},
+        **{name: os.environ[name] for name in _DECIDING if name in os.environ},
     }
 
 
@@ -57,7 +71,7 @@ def _cache_directory() -> Path | None:
         why = getattr(error, "strerror", None) or str(error)
         where = getattr(error, "filename", None) or "the folder of caches"
         what = f"the cache of compiled kernels cannot be used: {why[0].lower()}{why[1:]} (found {where})"
-        compiling.set_trouble(f"{what}; name a folder of your own with XDG_CACHE_HOME")
+        compiling.set_trouble(f"{what}; {beforehand.REMEDY}")
         return _temporary(name)
 
 
@@ -65,15 +79,17 @@ def _opened(name: str) -> Path:
     """The folder of a name, whose file of locks is open."""
     global _lock
     directory = cache_folder.prepare(name)
-    _lock = os.open(directory / "lock", os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_CLOEXEC, 0o600)
+    _locks.append(cache_folder.opened_lock(directory / "lock"))
+    _lock = _locks[-1].fileno()
     return directory
 
 
 def _temporary(name: str) -> Path | None:
     """A folder that goes with this process, in which it keeps what is needed, also for its workers."""
     try:
-        folder = tempfile.mkdtemp(prefix="brakecli-")
-        os.environ[cache_folder.TEMPORARY] = folder
+        _remove_stale()
+        folder = tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-")
+        os.environ[cache_folder.BASE] = folder
         os.environ[beforehand.VARIABLE] = beforehand.LAZY
         atexit.register(_removed, folder, os.getpid())
         return _opened(name)
@@ -81,13 +97,35 @@ def _temporary(name: str) -> Path | None:
         return None
 
 
+def _remove_stale() -> None:
+    """Remove such folders of processes that were killed: theirs are older than an hour, and they have ended."""
+    for path in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*-*"):
+        with suppress(OSError, ValueError):
+            status = path.lstat()
+            owner = int(path.name.removeprefix(_TEMPORARY).partition("-")[0])
+            if status.st_uid == os.geteuid() and time.time() - status.st_mtime > _STALE and not _is_running(owner):
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
 def _removed(folder: str, owner: int) -> None:
     if os.getpid() == owner:
         shutil.rmtree(folder, ignore_errors=True)
 
 
+_locks: list[IO[str]] = []
 _lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
 CACHE = _cache_directory()
+_LARGEST = 100_000_000  # bytes of a file of the cache
 _PAUSE = 0.02  # s between two looks whether another process has compiled a kernel
 PATIENCE = 60.0  # s that another process may take to compile a kernel
 _held: list[int] = []  # the bytes locked for the kernels that this process compiles, each called by the one before
@@ -102,15 +140,17 @@ class _CheckedFiles(caching.IndexDataCacheFile):  # type: ignore[misc]
     def load(self, key: Any) -> Any:
         found = super().load(key)
         if found is None:
-            if CACHE is not None and beforehand.names(CACHE, Path(self._index_path)):
-                beforehand.forget(CACHE)  # what should be there cannot be loaded
-                _prepare.cache_clear()
-                _prepare()
-                if (found := super().load(key)) is not None:
-                    return found
+            if self._is_damaged(key) and _remade() and (found := super().load(key)) is not None:
+                return found
             _wait_for_others(zlib.crc32(Path(self._index_path).name.encode()))
             found = super().load(key)  # another process may have compiled it meanwhile
         return found
+
+    def _is_damaged(self, key: Any) -> bool:
+        """Whether a kernel that should be there cannot be loaded."""
+        if CACHE is None or not beforehand.names(CACHE, Path(self._index_path)):
+            return False
+        return not _is_whole(self._index_path) or key in self._load_index()
 
     def _load_index(self) -> Any:
         return super()._load_index() if _is_whole(self._index_path) else {}
@@ -149,7 +189,7 @@ def _wait_for_others(place: int) -> None:
 
 def _is_whole(path: str) -> bool:
     try:
-        data = Path(path).read_bytes()
+        data = cache_folder.read(Path(path), _LARGEST)
     except OSError:
         return False
     return data[-4:] == _checksum(path, data[:-4])
@@ -198,10 +238,28 @@ def is_cached(dispatcher: Any, signature: Any) -> bool:
 
 
 @cache
-def _prepare() -> None:
-    """See to it once that the cache holds all kernels; what keeps it from that is told with the first compiled."""
-    if CACHE is not None and (why := beforehand.prepare(CACHE, FACTS)):
-        compiling.set_trouble(why)
+def _prepare() -> bool:
+    """See to it once that the cache holds all kernels; whether it does. What keeps it from that is told."""
+    if CACHE is None:
+        return False
+    if why := beforehand.prepare(CACHE, FACTS):
+        compiling.warn(why)
+    return not why
+
+
+def _remade() -> bool:
+    """Have all kernels of a damaged cache compiled anew; whether they are."""
+    assert CACHE is not None
+    try:
+        beforehand.forget(CACHE)
+    except OSError as error:
+        why = f"{(error.strerror or str(error)).lower()} (found {error.filename})"
+        compiling.warn(
+            f"the cache of compiled kernels is damaged, and cannot be mended: {why}; {beforehand.REMEDY}"
+        )
+        return False
+    _prepare.cache_clear()
+    return _prepare()
 
 
 def compile_for(dispatcher: Any, signature: Any) -> None:

@@ -1,6 +1,7 @@
 """Kernels that are compiled beforehand: the manifest, who waits for whom, and what is done where it cannot be."""
 
 import fcntl
+import json
 import os
 import resource
 import shutil
@@ -99,22 +100,100 @@ def test_whoever_compiles_himself_waits_for_nobody(
     assert made == []
 
 
-def test_what_keeps_children_from_compiling_is_told(
+def test_what_keeps_children_from_compiling_is_told_with_the_remedy(
     made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     with monkeypatch.context() as patch:
         patch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=1, f_frsize=4096))
-        assert beforehand.prepare(tmp_path, FACTS).endswith(f"the disk of {tmp_path} is nearly full")
+        told = beforehand.prepare(tmp_path, FACTS)
+        assert told.endswith(f"(found {tmp_path}); free 200 MB there, or {beforehand.REMEDY}")
     with monkeypatch.context() as patch:
         patch.setattr(resource, "getrlimit", lambda which: (10**9, 10**9))
-        assert beforehand.prepare(tmp_path, FACTS).endswith("the address space is limited")
+        assert beforehand.prepare(tmp_path, FACTS).endswith("raise the limit with: ulimit -v unlimited")
     with monkeypatch.context() as patch:
         patch.setattr(sys, "executable", "")
-        assert beforehand.prepare(tmp_path, FACTS).endswith("there is no interpreter to start")
-    with monkeypatch.context() as patch:
-        patch.setattr(beforehand, "_LOCK", "no/such/folder")
-        assert beforehand.prepare(tmp_path, FACTS).endswith("beforehand: No such file or directory")
+        assert beforehand.prepare(tmp_path, FACTS).endswith("call brakecli once from a shell")
+    (tmp_path / "file").write_text("in the way")
+    told = beforehand.prepare(tmp_path / "file", FACTS)
+    assert told.endswith(f"beforehand: file exists (found {tmp_path}/file); {beforehand.REMEDY}")
     assert made == []
+
+
+def test_an_unknown_way_to_compile_is_told(
+    made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told: list[str] = []
+    monkeypatch.setenv(beforehand.VARIABLE, "later")
+    compiling.set_warning(told.append)
+    try:
+        assert beforehand.prepare(tmp_path, FACTS) == ""
+    finally:
+        compiling.set_warning(None)
+    assert told == ["BRAKECLI_COMPILE: unknown value (found 'later'); it may be 'lazy'"]
+
+
+def test_a_folder_that_has_vanished_is_made_again(made: list[Path], tmp_path: Path) -> None:
+    assert beforehand.prepare(tmp_path / "a" / "b", FACTS) == ""
+    assert made == [tmp_path / "a" / "b"]
+    assert (tmp_path / "a" / "b").stat().st_mode & 0o777 == 0o700
+
+
+def _fifo(path: Path) -> None:
+    os.mkfifo(path)
+
+
+def _deep(path: Path) -> None:
+    path.write_text(200_000 * "[")
+
+
+def _long(path: Path) -> None:
+    path.touch()
+    os.truncate(path, 10**11)
+
+
+def _link(path: Path) -> None:
+    (path.parent / "precious").write_text("mine")
+    path.symlink_to("precious")
+
+
+def _folder(path: Path) -> None:
+    path.mkdir()
+    (path / "file").touch()
+
+
+@pytest.mark.parametrize("make", [_fifo, _deep, _long, _link, _folder])
+@pytest.mark.parametrize("name", [beforehand.MANIFEST, "total", "part/a.nbi", "part/a.1.nbc"])
+def test_whatever_is_in_the_place_of_a_file_is_replaced(
+    made: list[Path], tmp_path: Path, make: Callable[[Path], None], name: str
+) -> None:
+    beforehand.prepare(tmp_path, FACTS)
+    (tmp_path / name).unlink(missing_ok=True)
+    make(tmp_path / name)
+    if name == "total":
+        beforehand.forget(tmp_path)
+    for _ in range(2):
+        assert beforehand.prepare(tmp_path, FACTS) == ""
+    assert len(made) == 2
+    assert not (tmp_path / "part" / "precious").exists() or (tmp_path / "part" / "precious").read_text() == "mine"
+
+
+@pytest.mark.parametrize("make", [_fifo, _link, _folder])
+def test_what_is_in_the_place_of_the_lock_is_left_alone_and_told(
+    made: list[Path], tmp_path: Path, make: Callable[[Path], None]
+) -> None:
+    make(tmp_path / "beforehand.lock")
+    told = beforehand.prepare(tmp_path, FACTS)
+    assert f"(found {tmp_path}/beforehand.lock); {beforehand.REMEDY}" in told
+    assert made == []
+    assert not (tmp_path / "precious").exists() or (tmp_path / "precious").read_text() == "mine"
+
+
+def _interpreter(folder: Path, script: str) -> str:
+    """What runs a script of the shell in place of Python's; $5 is the folder of kernels."""
+    interpreter = folder / "python"
+    interpreter.write_text(f"#!/bin/sh\n{script}\n")
+    interpreter.chmod(0o755)
+    return str(interpreter)
 
 
 @pytest.mark.parametrize(
@@ -122,21 +201,42 @@ def test_what_keeps_children_from_compiling_is_told(
     [
         ("echo one >&2; echo out of memory >&2; exit 1", "out of memory"),
         ("exit 0", "0 of 0 could be kept"),
-        ("kill -9 $$", "0 of 0 could be kept"),
+        ("kill -9 $$", "signal 9 has ended what compiles them, perhaps for lack of memory"),
     ],
 )
 def test_children_that_fail_leave_no_manifest_and_their_last_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str
 ) -> None:
-    interpreter = tmp_path / "python"
-    interpreter.write_text(f"#!/bin/sh\n{script}\n")
-    interpreter.chmod(0o755)
     cache = tmp_path / "cache"
-    cache.mkdir()
     monkeypatch.delenv(beforehand.VARIABLE, raising=False)
-    monkeypatch.setattr(sys, "executable", str(interpreter))
-    assert beforehand.prepare(cache, FACTS) == f"the kernels cannot be compiled beforehand: {said}"
+    monkeypatch.setattr(sys, "executable", _interpreter(tmp_path, script))
+    told = beforehand.prepare(cache, FACTS)
+    assert told == f"the kernels cannot be compiled beforehand: {said} (found {cache}); {beforehand.REMEDY}"
     assert not (cache / beforehand.MANIFEST).exists()
+
+
+def test_a_complete_set_counts_though_a_child_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    script = 'echo code > "$5/a.1.nbc"; echo index > "$5/a.nbi"; printf 1 > "$5/total"; kill -9 $$'
+    monkeypatch.delenv(beforehand.VARIABLE, raising=False)
+    monkeypatch.setattr(sys, "executable", _interpreter(tmp_path, script))
+    cache = tmp_path / "cache"
+    assert beforehand.prepare(cache, FACTS) == ""
+    assert (cache / beforehand.MANIFEST).exists()
+
+
+def test_children_look_for_modules_where_this_process_does_but_not_in_its_folder(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    root = str(Path(beforehand.__file__).parents[2])
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(sys, "path", ["", str(tmp_path), "relative", "/somewhere", root])
+    assert beforehand._places() == ["/somewhere", root]
+    monkeypatch.setattr(sys, "path", ["/somewhere"])
+    assert beforehand._places() == ["/somewhere", root]
+    (tmp_path / "gone").mkdir()
+    monkeypatch.chdir(tmp_path / "gone")
+    (tmp_path / "gone").rmdir()
+    assert beforehand._places() == ["/somewhere", root]
 
 
 def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
@@ -184,18 +284,29 @@ def test_children_come_towards_each_other() -> None:
 
 def child(folder: Path, cache: Path, stdin: int) -> subprocess.CompletedProcess[str]:
     changes: dict[str, str | None] = {"XDG_CACHE_HOME": str(cache), beforehand.VARIABLE: beforehand.CHILD}
-    words = [sys.executable, "-P", "-m", beforehand.__name__, str(folder), "0", "1"]
+    words = [
+        sys.executable,
+        "-I",
+        "-c",
+        beforehand._START,
+        json.dumps(beforehand._places()),
+        str(folder),
+        "0",
+        "1",
+    ]
     return subprocess.run(words, stdin=stdin, capture_output=True, text=True, env=environment(**changes))
 
 
 @campaign
 def test_a_child_ends_with_the_process_that_has_started_it(tmp_path: Path) -> None:
     """Its standard input has an end then."""
-    wrong = child(tmp_path, tmp_path / "cache", subprocess.PIPE)
+    with subprocess.Popen(["sleep", "60"], stdout=subprocess.PIPE) as other:
+        assert other.stdout is not None
+        wrong = child(tmp_path, tmp_path / "cache", other.stdout.fileno())
+        other.kill()
     (folder,) = (tmp_path / "cache" / "brakecli").iterdir()
-    assert wrong.stderr == f"the cache is {folder}, not {tmp_path}\n"
-    assert child(folder, tmp_path / "cache", subprocess.DEVNULL).returncode == 0
-    assert int((folder / "total").read_text()) > 100
+    assert wrong.stderr == f"the cache is {folder}\n"
+    assert child(folder, tmp_path / "cache", subprocess.DEVNULL).returncode == 1
     assert not any(folder.rglob("*.nbc"))
 
 

@@ -236,6 +236,22 @@ def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:
     assert out.splitlines() == ["(2.0, 0.0, 1.0)", "True"]
 
 
+def test_a_temporary_cache_goes_with_its_process_or_where_that_was_killed_with_a_later_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("TMPDIR", str(tmp_path))
+    (tmp_path / "file").write_text("in the way")
+    ended = subprocess.Popen(["true"])
+    ended.wait()
+    names = [f"brakecli-kernels-{process}-{age}" for process in (ended.pid, os.getpid()) for age in ("old", "new")]
+    for name in (*names, "brakecli-kernels-none-old"):
+        (tmp_path / name).mkdir()
+        if name.endswith("old"):
+            os.utime(tmp_path / name, (1e9, 1e9))
+    assert python(COUNT.format(limit=""), tmp_path / "file").splitlines() == ["(2.0, 0.0, 1.0)", "True"]
+    assert {path.name for path in tmp_path.glob("brakecli-*")} == {*names[1:], "brakecli-kernels-none-old"}
+
+
 def noise(data: bytes) -> bytes:
     """In the head of the machine code, which LLVM does not check: it ends the process."""
     return data[:50] + random.Random(17).randbytes(50) + data[100:]
