@@ -18,9 +18,8 @@ def bracketed_root(
     high: float,
     *,
     absolute: float = 0.0,
-    relative: float = _ROUNDING,
 ) -> float:
-    """Where a function that has other signs at both ends passes zero, with errors over 1 and over the root.
+    """Where a function that has other signs at both ends passes zero, to `absolute` or four units of rounding.
 
     By inverse quadratic interpolation where it is sure to hit the bracket, else by halves: T. R. Chandrupatla,
     Advances in Engineering Software 28 (1997) 145-149. Raises ValueError where both ends have one sign.
@@ -32,7 +31,7 @@ def bracketed_root(
     part = 0.5
     while True:
         best = new if abs(new.f) < abs(end.f) else end
-        least = 0.5 * (absolute + relative * abs(best.x)) / abs(end.x - new.x) if end.x != new.x else 1.0
+        least = 0.5 * (absolute + _ROUNDING * abs(best.x)) / abs(end.x - new.x) if end.x != new.x else 1.0
         if least > 0.5 or best.f == 0.0:
             return best.x
         x = new.x + min(max(part, least), 1.0 - least) * (end.x - new.x)

@@ -14,7 +14,6 @@ from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.records import EVALUATE, LAYER, Layer
-from brakecli.solver.roots import bracketed_root
 from brakecli.solver.roughness import turn
 from brakecli.solver.system import System
 
@@ -217,8 +216,9 @@ def steady_sliding(
                 raise _none("the load lifts the shoe off the wheel and no link holds it")
             y = -push / spring
         elif unbalanced(full) < 0.0:
-            height = _HEIGHT * max(abs(full), abs(top))
-            y = bracketed_root(unbalanced, full, top, absolute=height, relative=_RELATIVE)
+            from scipy.optimize import brentq  # only pads that open wait for it
+
+            y = brentq(unbalanced, full, top, xtol=_HEIGHT * max(abs(full), abs(top), 1e-300), rtol=_RELATIVE)
         else:
             raise _none("the friction force lifts more than the load presses (self-locking)")
     force, stiffness, fraction = mean(float(y))
