@@ -19,7 +19,7 @@ import time
 from contextlib import suppress
 from pathlib import Path
 from threading import Thread
-from typing import IO, Any
+from typing import Any
 
 from brakecli.solver import cache_folder, compiling
 
@@ -80,14 +80,17 @@ def prepare(folder: Path, facts: dict[str, str]) -> str:
         folder.mkdir(mode=cache_folder.OURS, parents=True, exist_ok=True)
         if hindrance := _hindrance(folder):
             return hindrance
-        with cache_folder.opened_lock(folder / _LOCK) as lock:
+        lock = cache_folder.opened_lock(folder / _LOCK)
+        try:
             return _made(folder, facts, lock)
+        finally:
+            os.close(lock)
     except OSError as error:
         what = f"the kernels cannot be compiled beforehand: {(error.strerror or str(error)).lower()}"
         return f"{what} (found {error.filename or folder}); {REMEDY}"
 
 
-def _made(folder: Path, facts: dict[str, str], lock: IO[str]) -> str:
+def _made(folder: Path, facts: dict[str, str], lock: int) -> str:
     """Have all kernels compiled, or wait until another process has done so; why they are not, or an empty text."""
     waits = not _is_ours(lock)
     if not waits and _fits(folder, facts):  # another process has just made them
@@ -163,7 +166,7 @@ def _hindrance(folder: Path) -> str:
     return ""
 
 
-def _is_ours(lock: IO[str]) -> bool:
+def _is_ours(lock: int) -> bool:
     """Whether this process has got the lock, or there are none on this disk."""
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)

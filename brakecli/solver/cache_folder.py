@@ -11,7 +11,6 @@ import os
 import pwd
 import stat
 from pathlib import Path
-from typing import IO
 
 BASE = "BRAKECLI_CACHES"
 """The environment variable by which a process hands its folder of caches to those that it starts."""
@@ -59,13 +58,13 @@ def read(path: Path, most: int) -> bytes:
         return opened.read()
 
 
-def opened_lock(path: Path) -> IO[str]:
-    """A file that holds nothing but locks; raises OSError where something else is in its place."""
+def opened_lock(path: Path) -> int:
+    """The descriptor of a file of locks; raises OSError where something else is in its place."""
     file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW | os.O_NONBLOCK | os.O_CLOEXEC, 0o600)
     if not stat.S_ISREG(os.fstat(file).st_mode):
         os.close(file)
         raise OSError(errno.EINVAL, "it is no file", str(path))
-    return open(file, "r+")  # noqa: PTH123 - a descriptor
+    return file
 
 
 def refuse_shared(folder: Path) -> None:

@@ -13,7 +13,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import llvmlite
 import numba
@@ -79,8 +79,7 @@ def _opened(name: str) -> Path:
     """The folder of a name, whose file of locks is open."""
     global _lock
     directory = cache_folder.prepare(name)
-    _locks.append(cache_folder.opened_lock(directory / "lock"))
-    _lock = _locks[-1].fileno()
+    _lock = cache_folder.opened_lock(directory / "lock")
     return directory
 
 
@@ -122,7 +121,6 @@ def _removed(folder: str, owner: int) -> None:
         shutil.rmtree(folder, ignore_errors=True)
 
 
-_locks: list[IO[str]] = []
 _lock = -1  # the file whose bytes are the locks of kernels; it stays open, as closing it would let go of all
 CACHE = _cache_directory()
 _LARGEST = 100_000_000  # bytes of a file of the cache
