@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from brakecli.solver import implicit_step
+from brakecli.solver import implicit_step, schemes
 from brakecli.solver.compile import address
 from brakecli.solver.schemes import event_driven
 from tests.campaign import campaign
@@ -212,6 +212,7 @@ def test_the_order_in_which_kernels_are_loaded_changes_no_byte(tmp_path: Path) -
 
 
 def test_a_kernel_that_is_called_by_its_address_is_there_with_its_scheme() -> None:
+    schemes.load("event-driven")
     kernel: Any = event_driven.solve
     (compiled,) = kernel.overloads.values()
     assert address(kernel) == compiled.library.get_pointer_to_function(compiled.fndesc.llvm_func_name) != 0
