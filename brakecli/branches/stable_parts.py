@@ -84,7 +84,7 @@ def _bound(followed: Followed, k: int, way: int) -> Bound:
 
 
 def told_apart(bounds: list[Bound]) -> list[Bound]:
-    """The bounds in order, with their bars, without pairs that are closer than either bar.
+    """The bounds in order, with their bars, without pairs that are closer than both their bars.
 
     An interval that is so narrow may be none; so may what lies between two.
     """

@@ -19,6 +19,7 @@ from brakecli.errors import BrakecliError, CannotWriteError
 from brakecli.files.os_signals import lastly
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import free_bytes
+from brakecli.solver.beforehand import cores
 from brakecli.solver.motion import Counted
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
@@ -113,11 +114,7 @@ def choose_engine(
 
 def crew(plan: Plan, jobs: int | None = None) -> int:
     """How many workers compute a sweep here: one for each core that this process may use, or `jobs`."""
-    try:
-        cores = len(os.sched_getaffinity(0))
-    except AttributeError:  # not on every system
-        cores = os.cpu_count() or 1
-    return min(jobs or cores, plan.units)
+    return min(jobs or cores(), plan.units)
 
 
 def sweep(

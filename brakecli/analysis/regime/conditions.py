@@ -67,7 +67,8 @@ def takes(a: Answers, t: Thresholds) -> bool:
 
 def friction_gives_most(a: Answers, t: Thresholds) -> bool:
     """Friction gives most of the energy, also of what is stored or set free."""
-    return _excess_of_friction(a, t) > _error_of_friction(a, t) + t.most * abs(a.power_left)
+    friction = a.power_of_friction, a.friction_error
+    return _gives_most(friction, (a.power_of_roughness, a.roughness_error), a.power_left, t)
 
 
 def friction_gives_less(a: Answers, t: Thresholds) -> bool:
@@ -87,26 +88,20 @@ def roughness_is_idle(a: Answers, t: Thresholds) -> bool:
 
 def roughness_gives_most(a: Answers, t: Thresholds) -> bool:
     """The waves give most of the energy, also of what is stored or set free."""
-    error = t.sure_errors * a.roughness_error
-    other = t.most * _may_give(a.power_of_friction, t.sure_errors * a.friction_error)
-    excess = a.power_of_roughness - t.most * max(a.power_of_friction, 0.0)
-    return excess > math.hypot(error, other) + t.most * abs(a.power_left)
+    roughness = a.power_of_roughness, a.roughness_error
+    return _gives_most(roughness, (a.power_of_friction, a.friction_error), a.power_left, t)
 
 
-def _excess_of_friction(a: Answers, t: Thresholds) -> float:
-    """Power (W) that friction gives beyond `most` times that of the roughness."""
-    return a.power_of_friction - t.most * max(a.power_of_roughness, 0.0)
+def _gives_most(one: tuple[float, float], other: tuple[float, float], left: float, t: Thresholds) -> bool:
+    """One gives surely more than `most` times what the other gives and what is left; powers (W) with their errors.
 
-
-def _error_of_friction(a: Answers, t: Thresholds) -> float:
-    """How far that may be off."""
-    other = t.most * _may_give(a.power_of_roughness, t.sure_errors * a.roughness_error)
-    return math.hypot(t.sure_errors * a.friction_error, other)
-
-
-def _may_give(power: float, error: float) -> float:
-    """Power (W) that one may give beyond what it is found to give: none where it surely takes."""
-    return max(power + error, 0.0) - max(power, 0.0)
+    What surely takes energy gives none, and has no error as a giver.
+    """
+    power, error = one
+    beside, doubt = other
+    given = max(beside, 0.0)
+    may_give = max(beside + t.sure_errors * doubt, 0.0) - given
+    return power - t.most * given > math.hypot(t.sure_errors * error, t.most * may_give) + t.most * abs(left)
 
 
 def balances(a: Answers, t: Thresholds) -> bool:
