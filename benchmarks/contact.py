@@ -17,15 +17,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numba import int64, njit, void
 
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.solver import contact
-from brakecli.solver.compile import Floats, address, at_address
+from brakecli.solver.arrays import Floats
+from brakecli.solver.contact.force import evaluate
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.motion import Motion, solve
-from brakecli.solver.records import EVALUATE, LAYER, Layer
+from brakecli.solver.integrate import Motion, solve
+from brakecli.solver.kernels import compiler
+from brakecli.solver.records import Layer
 from brakecli.solver.system import System
 
 CASES = Path(__file__).parents[1] / "cases" / "accuracy"
@@ -69,13 +69,10 @@ void repeat(long calls, double drift, double y, double reach, const double *omeg
 }
 """
 
-_evaluate_at = at_address(EVALUATE)
 
-
-@njit(void(int64, LAYER, int64))  # type: ignore[untyped-decorator]
-def _repeat(evaluate: int, layer: Layer, calls: int) -> None:
+def _repeat(layer: Layer, tables: Floats, scratch: Floats, calls: int) -> None:
     for i in range(calls):
-        _evaluate_at(evaluate)(DRIFT * i, HEIGHT, layer)
+        evaluate(DRIFT * i, HEIGHT, layer, tables, scratch)
 
 
 def in_c(system: System, nodes: int) -> tuple[Callable[[], None], Floats]:
@@ -133,11 +130,11 @@ def of_one_evaluation(system: System, nodes: int) -> dict[str, float]:
     work: dict[str, Callable[[], Any]] = {"C": run}
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, nodes)
     layers = {}
+    repeat = compiler().njit(_repeat)
     for name in ("midpoint", "exact", "closed-form"):
-        evaluate = contact.load(name)
-        layers[name] = build_layer(evaluate, pad)
+        layers[name] = build_layer(name, pad)
         layers[name].contact.reach = REACH
-        work[name] = partial(_repeat, address(evaluate), layers[name], CALLS)
+        work[name] = partial(repeat, *layers[name], CALLS)
     best = fastest(work)
     force = sums[0] * pad.constants.k * 2.0 * system.half_length / nodes
     if not np.isclose(force, layers["midpoint"].contact.normal_force, rtol=1e-12):

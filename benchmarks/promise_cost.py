@@ -20,9 +20,9 @@ from brakecli.comparison.compare import errors
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError
 from brakecli.runs.tolerance import certify
-from brakecli.solver.compile import Floats
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion import solve
 from brakecli.solver.system import System
 
 CASES = Path(__file__).parents[1] / "cases"

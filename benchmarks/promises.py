@@ -20,8 +20,8 @@ from brakecli.case.system import system_of
 from brakecli.comparison.compare import errors
 from brakecli.errors import BrakecliError
 from brakecli.runs.tolerance import certify
+from brakecli.solver.integrate import solve
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.motion import solve
 from brakecli.solver.quantities import HISTORY, ContactState
 
 KINDS = (

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.energy import EnergyAccount
-from brakecli.solver.motion import Work, solve
+from brakecli.solver.integrate import Work, solve
 from brakecli.solver.quantities import HISTORY
 
 SQUEAL: dict[str, Any] = {  # flat; linear critical friction coefficient 0.575 with these dashpots

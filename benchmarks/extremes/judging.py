@@ -20,9 +20,10 @@ from brakecli.comparison.compare import errors
 from brakecli.errors import RefusedError
 from brakecli.runs.limits import check, refuse, within_range
 from brakecli.runs.tolerance import certify
+from brakecli.solver.integrate import Work, solve
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.motion import Work, solve
 from brakecli.solver.quantities import HISTORY, Failure
+from brakecli.solver.schedules import values
 from brakecli.solver.system import System
 
 Rows = NDArray[np.float64]
@@ -191,7 +192,7 @@ def exponential(system: System, rows: Rows) -> Rows | None:
     ):
         return None
     grip = -float(states[0]) * c.phi * k if c.phi else 0.0
-    load = float(system.load["value"][0])
+    load = float(values(system.load)[0])
     a = np.zeros((5, 5))  # of (x, y, vx interval, vy interval, 1), the time in intervals
     a[0, 2] = a[1, 3] = 1.0
     a[2] = np.array([c.c_xx, c.c_xy + grip, c.b_xx / interval, c.b_xy / interval, load * c.sin_beta])

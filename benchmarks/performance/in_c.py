@@ -17,8 +17,8 @@ from numba import njit
 
 from brakecli.solver.contact import midpoint
 from brakecli.solver.contact.pad import BESIDE, TILE, build_layer
+from brakecli.solver.integrate import Stepping
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Stepping
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
 
@@ -134,7 +134,7 @@ def _steps(system: System, library: Any, per_gap: float) -> Beside:
     p = np.array([*numbers, per_gap, system.layer_stiffness])
     state = np.zeros(5)
     evaluated = [0]
-    begun = Stepping(system).plant.state
+    begun = Stepping(system).state
     start = np.array([begun.x_old, begun.y_old, begun.x, begun.y, begun.force])
     last: list[Any] = [None]
 
@@ -147,7 +147,7 @@ def _steps(system: System, library: Any, per_gap: float) -> Beside:
         begin = time.process_time()
         stepping.block(count + 1)
         seconds = time.process_time() - begin
-        last[0] = (float(stepping.plant.state.x_old), int(stepping.counts.evaluations))
+        last[0] = (float(stepping.state.x_old), int(stepping.counts.evaluations))
         return seconds
 
     times = []

@@ -11,9 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.solver.integrate import Stepping
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Stepping
-from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import HALF, NUMEROV
 from brakecli.solver.system import System
 
@@ -134,7 +133,6 @@ def our_entry(system: System, method: Method, label: str) -> Entry:
 def loop(system: System) -> tuple[float, Floats]:
     """Seconds of the loop, and its samples; the last one is taken outside of it, as in `solve`."""
     stepping = Stepping(system)
-    last = np.zeros(len(HISTORY))
     end = system.steps + system.scheme.LAG
     seconds = 0.0
     parts = list[Floats]()
@@ -142,9 +140,7 @@ def loop(system: System) -> tuple[float, Floats]:
         begin = time.process_time()
         parts.append(stepping.block(end))
         seconds += time.process_time() - begin
-    if not stepping.work.failed:
-        system.scheme.sample(stepping.plant, last)
-    return seconds, np.vstack([*parts, last])[:, :4]
+    return seconds, np.vstack([*parts, stepping.last_row()])[:, :4]
 
 
 def our_ladders(system: System) -> Iterator[Ladder]:

@@ -18,8 +18,8 @@ from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.front.inputs import load_sweep
 from brakecli.runs.tolerance import certify
+from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion import solve
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System

@@ -64,6 +64,7 @@ def _scale(each: Judged) -> int:
 def _method(each: Judged) -> str:
     """How the error was estimated."""
     for sign, name in (
+        ("held against", "a difference scheme, held against one of these"),
         ("nodes", "the error carried along, on nodes"),
         ("carried", "the error carried along, exact or closed-form contact"),
         ("rounding", "exact steps"),

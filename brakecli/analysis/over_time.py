@@ -10,7 +10,7 @@ import numpy as np
 from brakecli.analysis.spectrum import Array, peak
 from brakecli.solver.history import History
 from brakecli.solver.quantities import ContactState
-from brakecli.solver.schedules import value_at
+from brakecli.solver.schedules import value_at, values
 from brakecli.solver.system import System
 
 CYCLES = 20.0  # of the lower natural frequency in a window
@@ -67,7 +67,7 @@ def over_time(history: History, system: System) -> OverTime | None:
     middles = (np.arange(count) + _HOPS / 2).astype(np.float64) * hop * history.interval
     speed, load = (np.array([value_at(s, t) for t in middles]) for s in (system.belt, system.load))
     amplitude, swing, stick, friction = _statistics(history, hop, count)
-    pressed = float(np.abs(system.load["value"]).max()) / (system.coefficients.c_yy + system.contact_stiffness)
+    pressed = float(np.abs(values(system.load)).max()) / (system.coefficients.c_yy + system.contact_stiffness)
     loud = (swing >= LOUD * swing.max()) & (amplitude.max() > QUIET * pressed)
     length = _HOPS * hop * history.interval
     peaks = [peak(frequency, row, length) if on else None for row, on in zip(density, loud, strict=True)]

@@ -17,7 +17,7 @@ from brakecli.stop import signals_shown
 if TYPE_CHECKING:
     import xarray as xr
 
-    from brakecli.solver.motion import Counted
+    from brakecli.solver.integrate import Counted
 
     Result: TypeAlias = str | PathLike[str] | xr.Dataset | xr.DataTree
     Progress = bool | Callable[[str, int, int], None]

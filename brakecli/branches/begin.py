@@ -11,9 +11,9 @@ from brakecli.branches.line import Shoe
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array
-from brakecli.solver.flow.repeating import Orbit
-from brakecli.solver.flow.seek import FOUND, LINEAR, Pursuit
-from brakecli.solver.flow.smooth import DONE
+from brakecli.solver.motion.advance import DONE
+from brakecli.solver.motion.flow import Orbit, Pursuit
+from brakecli.solver.motion.orbit import FOUND, LINEAR
 from brakecli.stop import signalled
 
 MOST_STEPS = 5_000_000
@@ -78,9 +78,9 @@ def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
     except np.linalg.LinAlgError:  # modes that are alike
         return UNKNOWN
     rate = float(values.real.max())
-    while motion.path.steps < MOST_STEPS and motion.way.time < longest and not signalled():
+    while motion.steps < MOST_STEPS and motion.time < longest and not signalled():
         if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
-            motion.way.duration = motion.way.time + max(NEARS / rate, AHEAD * motion.path.h)
+            motion.way.duration = motion.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()
         if outcome == LINEAR:
             return UNKNOWN if rate > 0.0 else FADES

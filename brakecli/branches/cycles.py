@@ -17,10 +17,9 @@ from brakecli.branches.line import Line
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Guess, Problem, Seen, steps_in_p
 from brakecli.errors import CaseError
-from brakecli.solver.automaton import BACKWARD, FORWARD, OPEN, STICK
-from brakecli.solver.flow.repeating import Orbit
-from brakecli.solver.flow.smooth import DONE, EVENTFUL, GRAZED, SmoothFlow
-from brakecli.solver.system import longest_step
+from brakecli.solver.motion.advance import DONE, EVENTFUL, GRAZED
+from brakecli.solver.motion.flow import Orbit, SmoothFlow
+from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
 
 DIFFERENCE = 3e-6
 """Change of the parameter for derivatives by it. Central ones are exact to 1e-10. A shoe needs that whose dashpots
@@ -110,7 +109,7 @@ class Cycles(Problem):
 
     def _flow(self, p: float) -> Flow:
         shoe = self.line.shoe(p)
-        return SmoothFlow(*shoe, longest_step(shoe.coefficients, shoe.stiffness))
+        return SmoothFlow(*shoe)
 
     def _rest(self, p: float) -> Array:
         """Steady sliding, from which states count."""

@@ -23,9 +23,9 @@ from brakecli.branches.newton import Settings, start
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Doubled, Guess, Problem, Seen, steps_in_p
 from brakecli.errors import CaseError
-from brakecli.solver.automaton import STICK
-from brakecli.solver.flow.repeating import Orbit
-from brakecli.solver.flow.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status
+from brakecli.solver.motion.flow import Orbit
+from brakecli.solver.motion.phases import STICK
+from brakecli.solver.motion.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status
 from brakecli.solver.period import common_period
 from brakecli.solver.roughness import surface
 from brakecli.solver.system import System
@@ -52,6 +52,7 @@ SAME = 1e-6
 REASONS = {
     Status.GRAZED: "an event is grazed",
     Status.TOO_MANY_EVENTS: "there are too many events in a segment",
+    Status.STALLED: "events do not end",
     Status.NOT_FINITE: "the motion grows without bound",
     Status.STOPPED: "it was interrupted",
 }

@@ -9,7 +9,7 @@ from brakecli.branches.line import Line
 from brakecli.branches.problem import Array
 from brakecli.errors import CaseError
 from brakecli.errors import Problem as Wrong
-from brakecli.solver.flow.rough import default_cells, default_steps
+from brakecli.solver.motion.rough import default_cells, default_steps
 from brakecli.solver.period import LONGEST, common_period
 from brakecli.solver.steady_sliding import sliding, tabulated
 from brakecli.solver.system import System

@@ -13,7 +13,7 @@ from brakecli.branches.line import Shoe
 from brakecli.branches.problem import Array
 from brakecli.branches.sliding import Change, Slide, stable_spans
 from brakecli.branches.told import Followed
-from brakecli.solver.flow.repeating import Orbit
+from brakecli.solver.motion.flow import Orbit
 
 PARTS = 5
 """Of all pushes one is made at the own value, if sliding is stable there; the others are spread."""

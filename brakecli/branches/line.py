@@ -14,8 +14,8 @@ from brakecli.case.case import Case
 from brakecli.case.read import key_path, put
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, Problem
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats
 from brakecli.solver.system import System
 
 MOST_KEPT = 64

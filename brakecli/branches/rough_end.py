@@ -8,7 +8,7 @@ import numpy as np
 from brakecli.analysis.stability.modes import slowest_of_cycles
 from brakecli.branches.begin import FADES, UNKNOWN, End
 from brakecli.branches.problem import Array
-from brakecli.solver.flow.rough import RoughFlow, Status, default_steps
+from brakecli.solver.motion.rough import RoughFlow, Status, default_steps
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
 from brakecli.stop import signalled

@@ -15,10 +15,9 @@ from brakecli.analysis.stability import report as linear
 from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.runs.limits import check, refuse, within_range
-from brakecli.solver import contact
-from brakecli.solver.compile import Floats
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import Counted, Motion, Work, solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Counted, Motion, Work, solve
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import load
 from brakecli.solver.system import System
@@ -145,7 +144,7 @@ def compare(
         found = ladder(system, steps)
         entries = list[Entry]()
         for kind in kinds(system, schemes):  # compilation is not part of the budget
-            _ = load(kind.scheme), contact.load("exact" if kind.evaluator == "auto" else kind.evaluator)
+            load(kind.scheme)
             label = method_label(kind)
             entries += [Entry(label, kind, each, place) for place, each in enumerate(rungs(kind, found))]
         begin = time.perf_counter()

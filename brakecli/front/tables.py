@@ -66,7 +66,7 @@ def run_table(report: RunReport) -> str:
     shares = ", ".join(f"{kind} {count / max(work.steps, 1):.1%}" for kind, count in work.evaluators.items())
     on_nodes = any(EVALUATORS[kind].needs_nodes for kind in work.evaluators)
     nodes = f", {numbers['nodes']} nodes" if on_nodes else ""
-    step = "" if report.check.step is None else f" of {report.check.step:.4g} s"
+    step = "" if report.check.step is None else f" of {numbers['step']:.4g} s"
     error = abs(numbers["energy"]["relative_closing_error"])
     peak = text_of(numbers["spectrum_peak"]) if numbers["spectrum_peak"] is not None else ""
     since = f"from {numbers['settled_from']:.4g} s on"

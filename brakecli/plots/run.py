@@ -24,6 +24,7 @@ from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
 from brakecli.runs.cost import stability_seconds, table_seconds
 from brakecli.runs.limits import WORTH_SAYING
 from brakecli.solver.quantities import ContactState
+from brakecli.solver.schedules import times, values
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 
@@ -77,7 +78,7 @@ class RunPicture:
         self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
         self.part, first, stop = _detail(result, samples, self.interval)
         self.detail = {name: read(name, first, stop) for name in ("time", "state", *stored)}
-        self.detail["belt"] = np.interp(self.detail["time"], system.belt["time"], system.belt["value"])
+        self.detail["belt"] = np.interp(self.detail["time"], times(system.belt), values(system.belt))
         wholes = {name: envelope(partial(read, name), samples) for name in {**stored, self.whole: ""}}
         self.envelope = start + self.interval * wholes["x"][0], *wholes[self.whole][1:]
         fastest = style.largest(self.detail["belt"])
@@ -100,7 +101,7 @@ class RunPicture:
         fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
         self.resolution = result.attributes.get("frequency_resolution")  # Hz, not in older files
-        steady = np.ptp(system.belt["value"]) == 0.0
+        steady = np.ptp(values(system.belt)) == 0.0
         fastest = system.fastest_belt
         self.passing = tuple(sorted(fastest * system.wheel.turns)) if steady and fastest else ()  # Hz
         self.modes = _mode_frequencies(system)

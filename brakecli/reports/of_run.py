@@ -27,7 +27,7 @@ from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.reports.blocks import PAGE, Code, Part, Section, Table, Texts, numbers_of, percent, picture, shown
 from brakecli.runs.advise import AdviceReport, advise
-from brakecli.solver.motion import Counted
+from brakecli.solver.integrate import Counted
 from brakecli.sweeps.result import unit
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"

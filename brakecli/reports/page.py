@@ -16,7 +16,7 @@ from brakecli.files.trust import readings
 
 if TYPE_CHECKING:
     from brakecli.reports.blocks import Part
-    from brakecli.solver.motion import Counted
+    from brakecli.solver.integrate import Counted
 
 LARGEST = 3_000_000  # bytes
 

@@ -22,7 +22,7 @@ from brakecli.files.field import values_of
 from brakecli.runs.cost import duration_text, guessed, stability_seconds, table_seconds
 from brakecli.runs.judge import asked, judged_in_memory
 from brakecli.runs.settled import Judged, settled
-from brakecli.solver.motion import Counted, Motion
+from brakecli.solver.integrate import Counted, Motion
 from brakecli.solver.system import System
 
 # of a run that checks, which is cut short beyond

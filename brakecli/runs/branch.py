@@ -22,7 +22,7 @@ from brakecli.files.field import Field, integer, values_of
 from brakecli.files.valid import LARGEST_SQUARE
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
-from brakecli.solver.compile import Floats
+from brakecli.solver.arrays import Floats
 
 MULTIPLIERS = 4
 EQUATIONS = ALONE | {"roughness"}

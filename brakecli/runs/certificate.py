@@ -1,15 +1,16 @@
-"""How far histories may be off, and how that is known: by what two runs of different fineness differ by."""
+"""How far histories may be off, and how that is known: what runs say of themselves, or differ by."""
 
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.solver.compile import Floats
-from brakecli.solver.motion import Motion
-from brakecli.solver.system import System
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import Motion
+from brakecli.solver.schedules import values
+from brakecli.solver.system import WHOLE, System
 
 ROUNDING = 1e-12  # least estimate: runs that share their rounding agree better than they are right
 MISSED = 1.0000001
@@ -81,7 +82,15 @@ class Apart:
     @cached_property
     def error(self) -> float:
         """The largest relative difference, but no less than rounding."""
-        return max(float(np.max(self.of.max(axis=1) / self.size)), ROUNDING) if self.whole else 1.0
+        return self.error_until(math.inf)
+
+    def error_until(self, until: float) -> float:
+        """That up to a time (s)."""
+        if not self.whole:
+            return NOTHING
+        samples = 1 + int(min(until / self.interval + WHOLE, self.of.shape[1]))
+        error = float(np.max(self.of[:, :samples].max(axis=1) / self.size))
+        return max(error, ROUNDING) if error < math.inf else NOTHING
 
     def until(self, limit: float) -> float:
         """Until when (s) they differ by no more than a limit."""
@@ -96,7 +105,7 @@ def displacement(system: System) -> tuple[float, float]:
     """How far from its start (m) another rounding of it may lie."""
     c = system.coefficients
     initial = system.initial
-    load = float(np.abs(system.load["value"]).max())
+    load = float(np.abs(values(system.load)).max())
     heights = sum(float(np.abs(each.g).sum()) for each in (system.shoe, system.wheel))
     pressed = load / (c.c_yy + system.contact_stiffness) + heights
     pulled = load * (abs(c.sin_beta) + c.phi) / c.c_xx if initial.from_equilibrium and c.c_xx > 0.0 else 0.0
@@ -115,8 +124,8 @@ def replica(system: System) -> System:
     return replace(system, initial=replace(initial, x=initial.x + x, y=initial.y + y))
 
 
-def compare(coarse: Motion, fine: Motion, until: float = math.inf) -> Apart:
-    """What two runs differ by up to a time (s), relative to the latter.
+def compare(coarse: Motion, fine: Motion) -> Apart:
+    """What two runs differ by, relative to the latter.
 
     Components below rounding, such as the velocity of a resting shoe, are ignored.
     """
@@ -125,32 +134,11 @@ def compare(coarse: Motion, fine: Motion, until: float = math.inf) -> Apart:
     one, other = (
         np.ascontiguousarray(each.rows[::n, :4].T) for each, n in zip((coarse, fine), every, strict=True)
     )
-    count = other.shape[1] if until == math.inf else min(other.shape[1], 1 + round(until / system.interval))
-    whole = one.shape[1] >= count
-    one, other = one[:, :count], other[:, : one.shape[1]][:, :count]  # x, y, vx, vy
+    both = min(one.shape[1], other.shape[1])
+    whole = one.shape[1] >= other.shape[1]
+    one, other = one[:, :both], other[:, :both]  # x, y, vx, vy
     size = sizes(system, *(np.abs(each).max(axis=1) for each in (one, other)))
     return Apart(system.interval, np.abs(one - other), size, whole)
-
-
-@dataclass(frozen=True)
-class Rounding:
-    """What a motion makes of rounding, and what that leaves of a promise."""
-
-    error: float  # part of the estimate
-    until: float  # s, up to which a promise can be kept at all
-    left: float  # of the promise, for all other errors up to that time
-
-    @classmethod
-    def of(cls, beside: Motion, run: Motion, wanted: float) -> Self:
-        """By what a run and its replica differ by: twice that, as other roundings have other directions.
-
-        Where too little is left of the promise, it is to be kept as long as rounding takes no more than half.
-        """
-        apart = compare(beside, run)
-        error = 2.0 * apart.error
-        if error < 0.5 * wanted:
-            return cls(error, run.system.sampled_duration, wanted - error)
-        return cls(error, apart.until(0.25 * wanted), 0.5 * wanted)
 
 
 def sizes(system: System, one: Floats, other: Floats) -> Floats:

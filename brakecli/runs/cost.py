@@ -9,6 +9,7 @@ import numpy as np
 from brakecli.analysis.stability.report import FRICTIONS, LARGEST_FRICTION
 from brakecli.errors import CaseError
 from brakecli.solver.quantities import HISTORY
+from brakecli.solver.schedules import values
 from brakecli.solver.steady_sliding import PLACES, TABLE, averaged_length, fills_window, steady_sliding
 from brakecli.solver.system import System
 
@@ -89,7 +90,7 @@ def guessed(system: System) -> Price:
     if system.finds_patches:
         # Rough surfaces that the load presses together are seldom open in part.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
-        least_load = float(np.abs(system.load["value"]).min())
+        least_load = float(np.abs(values(system.load)).min())
         open_part = _PRESSED if heights * (c.c_yy + system.contact_stiffness) < least_load else _PLAYS
         each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
     return Price(steps, (1.0 if alone else _RUNS) * steps * each)

@@ -16,7 +16,7 @@ from brakecli.runs.certificate import Certificate
 from brakecli.runs.settled import Judged
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import Motion, Progress, Sink, solve
+from brakecli.solver.integrate import Motion, Progress, Sink, solve
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Track

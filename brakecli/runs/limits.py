@@ -26,6 +26,7 @@ from brakecli.runs.settled import longest
 from brakecli.solver.contact.pad import NODES_PER_WAVE
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
+from brakecli.solver.schedules import values
 from brakecli.solver.system import MOST_STEPS, WHOLE, System
 
 _TWO_DIGITS = Context(prec=2, rounding=ROUND_DOWN)
@@ -198,7 +199,7 @@ def _warnings(found: Check) -> Iterator[str]:
     if pad > around:
         longer = f"the pad of {pad:.3g} m is longer than the wheel's circumference of {around:.3g} m"
         yield f"contact.half_length: {longer}; check their units"
-    if system.load["value"].min() < 0.0:
+    if values(system.load).min() < 0.0:
         yield "load: the force is negative at times, it lifts the shoe off the wheel"
 
 
@@ -220,7 +221,7 @@ def _unresolved(system: System, per_period: float) -> Iterator[tuple[str, float,
     if passing * step > 1.0 / RESOLVED:
         what = f"{1.0 / (passing * step):.3g} steps per passing wave of the wheel ({passing:.4g} Hz)"
         yield what, 1.0 / (RESOLVED * passing), ""
-    grip = c.phi * float(np.abs(system.load["value"]).max()) / c.m
+    grip = c.phi * float(np.abs(values(system.load)).max()) / c.m
     if 0.0 < speed < grip * step:
         what = f"friction changes the shoe's velocity by up to {grip * step:.3g} m/s in a step"
         more = f"more than the wheel's {speed:.3g} m/s: stick and slip are not resolved"

@@ -1,6 +1,7 @@
 """What of the model a run has used, what it has left out, and why that was safe."""
 
-from brakecli.solver.motion import Motion
+from brakecli.solver.integrate import Motion
+from brakecli.solver.schedules import values
 
 
 def modelled(motion: Motion) -> tuple[list[str], list[str]]:
@@ -27,7 +28,7 @@ def modelled(motion: Motion) -> tuple[list[str], list[str]]:
         "the shoe's own roughness, which cancels while the pad touches everywhere": neither and system.shoe.g.size,
         "stick and slip: there is no friction": c.phi == 0.0,
         "the wheel's phase: its surface is the same everywhere": system.wheel.g.size == 0,
-        "the load: it is zero": not system.load["value"].any(),
+        "the load: it is zero": not values(system.load).any(),
         "dashpots: they are zero": c.b_xx == 0.0 == c.b_yy,
     }
     return [each for each, holds in used.items() if holds], [each for each, holds in left_out.items() if holds]

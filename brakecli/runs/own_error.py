@@ -14,17 +14,17 @@ import numpy as np
 
 from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, displacement, sizes
 from brakecli.runs.cost import FINEST, evaluation_seconds
-from brakecli.runs.ladder import MOST_SECONDS, first_nodes
-from brakecli.solver.compile import Floats
+from brakecli.runs.first import FIRST, first_nodes
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import NODES
-from brakecli.solver.motion import Motion
+from brakecli.solver.integrate import Motion
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import MOST_TABLE_BYTES, System
 
 SAFETY = 1.5
 """What is promised, over the error that a run knows; `make statistics` compares that with true ones."""
-FIRST = 0.2
-"""Tolerance of the first run over the requested one."""
+MOST_SECONDS = 900.0
+"""Time (s) of the loop after which no finer run is begun; a choice."""
 AIM = 0.4
 """Part of the promise that a finer run leaves to steps, and to nodes."""
 _FAR = 2.0
@@ -57,6 +57,11 @@ class Known(NamedTuple):
         with np.errstate(invalid="ignore"):  # nothing moves where a size is infinite
             of = np.where(np.isfinite(size), run.own.worst / size, 0.0)
         return cls(of.max(axis=2), run.own.unsure)
+
+    def by_nodes(self, part: float) -> float:
+        """The largest error by nodes in a part of the run, from its start on."""
+        spans = len(self.of)
+        return float(self.of[: math.ceil(min(part, 1.0) * spans), 1].max(initial=0.0))
 
     def until(self, limit: float, duration: float) -> float:
         """Up to when (s) it is surely below a limit."""

@@ -13,7 +13,7 @@ from brakecli.analysis.over_time import over_time
 from brakecli.runs.cost import Price, evaluation_seconds, guessed, start_seconds
 from brakecli.runs.judge import asked, motion_of, verdict_in_memory
 from brakecli.solver.history import array_history
-from brakecli.solver.motion import Motion
+from brakecli.solver.integrate import Motion
 from brakecli.solver.system import MOST_STEPS, System
 
 SECONDS = 0.15

@@ -29,7 +29,7 @@ from brakecli.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.runs.modelled import modelled
 from brakecli.runs.settled import settled
 from brakecli.solver.history import History
-from brakecli.solver.motion import Counted, Motion, Progress, Sink
+from brakecli.solver.integrate import Counted, Motion, Progress, Sink
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.system import System
 from brakecli.solver.track import KINDS, MIN, Track
@@ -75,7 +75,7 @@ def load_kernels(loaded: LoadedCase) -> System:
     """The system of a case, whose kernels are compiled or loaded: this takes seconds only once."""
     with within_range():
         system = system_of(loaded.case)
-    _ = system.scheme, system.evaluate
+    _ = system.scheme
     return system
 
 

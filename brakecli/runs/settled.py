@@ -13,7 +13,7 @@ from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.parts import SETTLED
 from brakecli.runs.certificate import Certificate
-from brakecli.solver.motion import Work
+from brakecli.solver.integrate import Work
 from brakecli.solver.system import System
 
 MOST_SAMPLES = 2_000_000

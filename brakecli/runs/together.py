@@ -9,13 +9,13 @@ import numpy as np
 
 from brakecli.errors import BrakecliError
 from brakecli.runs.certificate import Certified, displacement
-from brakecli.runs.ladder import FIRST_PER_WAVE, first_nodes
+from brakecli.runs.first import FIRST_PER_WAVE, first_nodes
 from brakecli.runs.own_error import exact_is_cheaper, promised
 from brakecli.runs.tolerance import begins_with_steps
 from brakecli.solver.alike import at_once
 from brakecli.solver.ensemble import fits, run_together
+from brakecli.solver.integrate import Motion
 from brakecli.solver.lanes.records import LANES
-from brakecli.solver.motion import Motion
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
 

@@ -1,13 +1,14 @@
 """Choose scheme, nodes and step so that the error of the histories stays below the requested tolerance.
 
-Runs whose steps are exact, and event-driven ones, know their own error. Runs of difference schemes are compared,
-and the finest one is the answer: what two of them differ by is the error of the coarser one.
+Runs whose steps are exact, and event-driven ones, know their own error. Runs of difference schemes are held
+against one of these.
 """
 
 from dataclasses import replace
 
 import numpy as np
 
+from brakecli.runs.against import against, reference_of
 from brakecli.runs.certificate import (
     DISPLACED,
     ROUNDING,
@@ -18,9 +19,8 @@ from brakecli.runs.certificate import (
     sizes,
 )
 from brakecli.runs.cost import evaluation_seconds
-from brakecli.runs.ladder import ladder
 from brakecli.runs.own_error import by_own_error, last_of
-from brakecli.solver.motion import Motion, Progress, solve
+from brakecli.solver.integrate import Motion, Progress, solve
 from brakecli.solver.system import System
 
 # Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
@@ -35,12 +35,17 @@ def certify(system: System, progress: Progress = lambda samples: None) -> Certif
     """Compute a motion to the tolerance of its method; `progress` receives the samples of the run in progress.
 
     Smooth surfaces go to the piecewise-exact scheme, as its cost does not depend on the error, and all others to
-    the event-driven one. A difference scheme is refined until its runs agree.
+    the event-driven one. A difference scheme is refined until it agrees with that motion.
     """
+
+    def run(rung: System) -> Motion:
+        return _solved(rung, progress)
+
     if system.method.row.exact:
         return _by_phases(system, progress)
-    runs = by_own_error(system) if system.method.own_steps else ladder(system)
-    return last_of(runs, lambda rung: _solved(rung, progress))
+    if system.method.own_steps:
+        return last_of(by_own_error(system), run)
+    return against(system, certify(reference_of(system), progress), run)
 
 
 def begins_with_steps(system: System) -> bool:

@@ -9,11 +9,11 @@ from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.stability.modes import growth, is_undamped
 from brakecli.branches.begin import UNKNOWN, End, on_smooth_pads
 from brakecli.branches.line import Shoe
-from brakecli.solver.automaton import STICK
-from brakecli.solver.compile import Floats
-from brakecli.solver.flow.repeating import Orbit
-from brakecli.solver.motion import solve
-from brakecli.solver.motions import V_X
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import solve
+from brakecli.solver.motion.flow import Orbit
+from brakecli.solver.motion.phases import STICK
+from brakecli.solver.motion.record import V_X
 from brakecli.solver.roughness import surface
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import Initial, System

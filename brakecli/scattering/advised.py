@@ -14,7 +14,7 @@ from brakecli.scattering.draw import drawn
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.scatter import squeals
 from brakecli.scattering.study import LoadedStudy
-from brakecli.solver.motion import Counted
+from brakecli.solver.integrate import Counted
 from brakecli.sweeps.listed import GIVEN, Listed
 from brakecli.sweeps.plan import LoadedSweep, sweep_of
 from brakecli.sweeps.workers.task import Engine

@@ -6,7 +6,7 @@ import numpy as np
 from scipy import stats
 
 from brakecli.analysis.probability import LEVEL
-from brakecli.solver.compile import Floats
+from brakecli.solver.arrays import Floats
 
 SHARES: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Shares of the samples below the quantiles that are reported."""

@@ -5,7 +5,7 @@ from scipy import stats
 
 from brakecli.errors import RefusedError, found
 from brakecli.scattering.study import SCRAMBLINGS, Study
-from brakecli.solver.compile import Floats
+from brakecli.solver.arrays import Floats
 
 _LEAST = 2.0**-53  # a probability: a normal value has no end
 _MOST_FOR_INDICES = 1 << 12  # samples of each of the two sets that indices compare

@@ -12,7 +12,7 @@ from brakecli.analysis.stability.report import critical_friction
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError, CaseError, Problem
 from brakecli.runs.limits import within_range
-from brakecli.solver.motion import Counted
+from brakecli.solver.integrate import Counted
 from brakecli.solver.steady_sliding import UNPRESSED, sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.driver import TaskQueue

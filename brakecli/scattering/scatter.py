@@ -23,8 +23,8 @@ from brakecli.scattering.answers import Indices, quantiles
 from brakecli.scattering.draw import drawn, for_indices, has_indices
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.study import SCRAMBLINGS, LoadedStudy, Study
-from brakecli.solver.compile import Floats
-from brakecli.solver.motion import Counted
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import Counted
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.listed import GIVEN, Listed

@@ -19,7 +19,7 @@ from brakecli.case.read import LoadedCase, key_path, parse_over_case, put
 from brakecli.case.tables import MISSING, Number, OverCase, Positive, Table, described, from_list, key_schema
 from brakecli.errors import CaseError, KeyPath, Problem, found
 from brakecli.files.toml_lines import innermost
-from brakecli.solver.compile import Floats
+from brakecli.solver.arrays import Floats
 
 SCRAMBLINGS = 8
 """Sequences of a study, each with its own scrambling: what they differ by gives the intervals."""

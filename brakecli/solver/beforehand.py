@@ -6,6 +6,7 @@ here.
 """
 
 import fcntl
+import gc
 import importlib
 import json
 import os
@@ -16,28 +17,31 @@ import subprocess
 import sys
 import tempfile
 import time
+import zlib
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 from threading import Thread
 from typing import Any
 
 from brakecli.solver import cache_folder, compiling
+from brakecli.solver.cache_folder import HOW, LAZY, MANIFEST, REMEDY
 
-VARIABLE = "BRAKECLI_COMPILE"
-"""The environment variable that says how kernels are compiled."""
-LAZY = "lazy"
-"""Its value for whoever edits the solver: each kernel as it is needed, by the process that needs it."""
 CHILD = "child"
 """Its value in the processes that compile all of them."""
-MANIFEST = "manifest.json"
-ROOM = 200e6
-"""Free bytes on a disk on which kernels are compiled beforehand; they take 40 million."""
-MOST_CHILDREN = 8
-PROCESSOR_SECONDS = 120.0
+ROOM = 30e6
+"""Free bytes on a disk on which kernels are compiled beforehand; they take 6 million."""
+MOST_CHILDREN = 4
+"""Processes that compile, at most: each takes 1 GB, and with more of them the largest kernel sets the time."""
+QUOTA = Path("/sys/fs/cgroup/cpu.max")
+"""Where a container says how much time (µs) it may take of each period (µs), on all cores together."""
+PROCESSOR_SECONDS = 150.0
 """Time (s) that one core takes for all kernels, about."""
-REMEDY = "name a folder of your own with XDG_CACHE_HOME"
 _LARGEST = 1_000_000  # bytes of a manifest
+_LARGEST_KERNEL = 100_000_000  # bytes of a file
 _TOTAL = "total"
+_STAMP = "stamp.json"  # in the folder of each kernel: its files with their sizes and checksums
+_TRIED = 8_000_000  # bytes that are written for a trial
 _LOCK = "beforehand.lock"
 _PAUSE = 0.2  # s between two looks how far the children are
 _SOLVER = Path(__file__).parent
@@ -52,19 +56,21 @@ child(*sys.argv[2:])
 
 def is_lazy() -> bool:
     """Whether kernels are compiled as they are needed."""
-    return os.environ.get(VARIABLE) == LAZY
+    return os.environ.get(HOW) == LAZY
 
 
 def is_child() -> bool:
     """Whether this process is one of those that compile all kernels."""
-    return os.environ.get(VARIABLE) == CHILD
+    return os.environ.get(HOW) == CHILD
 
 
 def cores() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    """Cores that this process may use, by its affinity and by the quota of its container."""
+    count = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    with suppress(OSError, ValueError):  # no such file on other systems; no number where there is no quota
+        quota, period = QUOTA.read_text().split()
+        return max(1, min(count, -(-int(quota) // int(period))))
+    return count
 
 
 def prepare(folder: Path, facts: dict[str, str]) -> str:
@@ -72,8 +78,8 @@ def prepare(folder: Path, facts: dict[str, str]) -> str:
 
     Returns what keeps them from it, as a sentence without its full stop, or an empty text.
     """
-    if (asked := os.environ.get(VARIABLE)) not in (None, "", LAZY, CHILD):
-        compiling.warn(f"{VARIABLE}: unknown value (found {asked!r}); it may be {LAZY!r}")
+    if (asked := os.environ.get(HOW)) not in (None, "", LAZY, CHILD):
+        compiling.warn(f"{HOW}: unknown value (found {asked!r}); it may be {LAZY!r}")
     if is_lazy() or is_child() or _fits(folder, facts):
         return ""
     try:
@@ -84,6 +90,8 @@ def prepare(folder: Path, facts: dict[str, str]) -> str:
         try:
             return _made(folder, facts, lock)
         finally:
+            with suppress(OSError):  # a disk without locks
+                fcntl.flock(lock, fcntl.LOCK_UN)  # a process that was forked meanwhile has it as well
             os.close(lock)
     except OSError as error:
         what = f"the kernels cannot be compiled beforehand: {(error.strerror or str(error)).lower()}"
@@ -102,22 +110,58 @@ def _made(folder: Path, facts: dict[str, str], lock: int) -> str:
             while not _is_ours(lock):
                 tell(*_come(folder))
                 time.sleep(_PAUSE)
+                if _fits(folder, facts):
+                    return ""
             if _fits(folder, facts):
                 return ""
             _wipe(folder)
         why = _compiled(folder, tell)
         if not why:
-            files = {str(path.relative_to(folder)): path.stat().st_size for path in sorted(folder.rglob("*.nb?"))}
-            manifest = {"facts": facts, "sources": _stamps(), "files": files}
+            names = [path.parent.name for path in sorted(folder.glob(f"*/{_STAMP}"))]
+            manifest = {"facts": facts, "sources": _stamps(), "names": names}
             _write(folder / MANIFEST, json.dumps(manifest, indent=1))
         return why
 
 
-def names(folder: Path, file: Path) -> bool:
-    """Whether the manifest says that a file is there."""
-    with suppress(OSError, ValueError, LookupError, TypeError, RecursionError):
-        return str(file.relative_to(folder)) in _manifest(folder)["files"]
+def is_sound(place: Path) -> bool:
+    """Whether a folder holds machine code as it was written: damaged code would end the process."""
+    return _matches(place, lambda path, size, checksum: _stamp(path) == [size, checksum])
+
+
+def vouch(place: Path) -> None:
+    """Write down what a folder holds, whose kernel has just been compiled."""
+    files = {str(path.relative_to(place)): _stamp(path) for path in sorted(place.rglob("*.nb?"))}
+    _write(place / _STAMP, json.dumps(files))
+
+
+def emptied(place: Path) -> Path | None:
+    """A folder for the machine code of a kernel, without what does not fit; None where it cannot be kept."""
+    try:
+        place.mkdir(mode=cache_folder.OURS, exist_ok=True)
+        for path in place.iterdir():
+            _remove(path)
+    except OSError:
+        return None
+    return place if is_ours(place) else None
+
+
+def is_ours(place: Path) -> bool:
+    """Whether this process may write in a folder and all below it: otherwise Numba takes another place."""
+    return all(os.access(each, os.W_OK) for each in (place, *place.rglob("*/")))
+
+
+def _matches(place: Path, matches: Callable[[Path, int, int], bool]) -> bool:
+    """Whether there is what is written down of a folder, and each file of it matches its size and checksum."""
+    with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
+        files = json.loads(cache_folder.read(place / _STAMP, _LARGEST))
+        return bool(files) and all(matches(place / name, *stamp) for name, stamp in files.items())
     return False
+
+
+def _stamp(path: Path) -> list[int]:
+    """Size and checksum of a file."""
+    contents = cache_folder.read(path, _LARGEST_KERNEL)
+    return [len(contents), zlib.crc32(contents)]
 
 
 def forget(folder: Path) -> None:
@@ -139,9 +183,11 @@ def _fits(folder: Path, facts: dict[str, str]) -> bool:
     """Whether the manifest says that all kernels are there, and they are."""
     try:
         manifest = _manifest(folder)
-        files = manifest["files"]
-        made = bool(files) and manifest["facts"] == facts and manifest["sources"] == _stamps()
-        return made and all((folder / name).lstat().st_size == size for name, size in files.items())
+        names = manifest["names"]
+        made = bool(names) and manifest["facts"] == facts and manifest["sources"] == _stamps()
+        return made and all(
+            _matches(folder / name, lambda path, size, _: path.lstat().st_size == size) for name in names
+        )
     except (OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
         return False
 
@@ -160,6 +206,13 @@ def _hindrance(folder: Path) -> str:
         return f"{what}: there is no interpreter to start; call brakecli once from a shell"
     if resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY:
         return f"{what}: the address space is limited; raise the limit with: ulimit -v unlimited"
+    try:
+        with tempfile.TemporaryFile(dir=folder) as file:  # a quota, or a limit of the length of files
+            file.write(bytes(_TRIED))
+    except OSError as error:
+        why = (error.strerror or str(error)).lower()
+        tried = f"{_TRIED / 1e6:.0f} MB cannot be written: {why}"
+        return f"{what}: {tried} (found {folder}); free some there, or {REMEDY}"
     status = os.statvfs(folder)
     if status.f_bavail * status.f_frsize < ROOM:
         return f"{what}: the disk is nearly full (found {folder}); free {ROOM / 1e6:.0f} MB there, or {REMEDY}"
@@ -179,17 +232,22 @@ def _is_ours(lock: int) -> bool:
 
 def _wipe(folder: Path) -> None:
     """Remove what does not fit, whatever it is."""
-    for path in [folder / MANIFEST, folder / _TOTAL, *folder.rglob("*.nb?")]:
-        if path.is_dir() and not path.is_symlink():
-            shutil.rmtree(path)
-        else:
-            path.unlink(missing_ok=True)
+    for path in folder.iterdir():
+        if path.name != _LOCK:
+            _remove(path)
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)
 
 
 def _come(folder: Path) -> tuple[int, int]:
     """How many kernels are there, of how many; 0 where this is not known yet."""
     with suppress(OSError, ValueError):
-        return sum(1 for _ in folder.rglob("*.nbc")), int(cache_folder.read(folder / _TOTAL, 20))
+        return sum(1 for _ in folder.glob(f"*/{_STAMP}")), int(cache_folder.read(folder / _TOTAL, 20))
     return 0, 0
 
 
@@ -199,39 +257,38 @@ def _places() -> list[str]:
         here = os.getcwd()  # noqa: PTH109 - pathlib's is the same
     except OSError:
         here = ""
-    found = [place for place in sys.path if place and os.path.isabs(place) and place != here]  # noqa: PTH117
+    texts = [place for place in sys.path if isinstance(place, str)]  # Python passes over others
+    found = [place for place in texts if place and os.path.isabs(place) and place != here]  # noqa: PTH117
     root = str(_SOLVER.parent.parent)
-    return found if root in found else [*found, root]
+    return found if root in found else [root, *found]
 
 
 def _compiled(folder: Path, tell: compiling.Tell) -> str:
     """Have children compile all kernels; why they have not, or an empty text."""
     count = min(cores(), MOST_CHILDREN)
-    environment = {**os.environ, VARIABLE: CHILD, "NUMBA_OPT": "1", cache_folder.BASE: str(folder.parent.parent)}
+    environment = {**os.environ, HOW: CHILD, "NUMBA_OPT": "1", cache_folder.BASE: str(folder.parent.parent)}
     children: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as said:
         try:
+            words = [
+                sys.executable,
+                "-I",
+                *(["-" + "O" * sys.flags.optimize] if sys.flags.optimize else []),
+                "-c",
+                _START,
+                json.dumps(_places()),
+                str(folder),
+            ]
             for k in range(count):
-                words = [
-                    sys.executable,
-                    "-I",
-                    "-c",
-                    _START,
-                    json.dumps(_places()),
-                    str(folder),
-                    str(k),
-                    str(count),
-                ]
-                children.append(
-                    subprocess.Popen(
-                        words,
-                        cwd=folder,
-                        stdin=subprocess.PIPE,
-                        stdout=subprocess.DEVNULL,
-                        stderr=said,
-                        env=environment,
-                    )
+                child = subprocess.Popen(
+                    [*words, str(k)],
+                    cwd=folder,
+                    stdin=subprocess.PIPE,
+                    stdout=subprocess.DEVNULL,
+                    stderr=said,
+                    env=environment,
                 )
+                children.append(child)
             while any(child.poll() is None for child in children):
                 tell(*_come(folder))
                 time.sleep(_PAUSE)
@@ -263,30 +320,24 @@ def _end_with_parent() -> None:
     os._exit(1)
 
 
-def _in_turn(kernels: list[Any], k: int, count: int) -> list[Any]:
-    """All kernels in the order of a child: pairs of them come towards each other, so that none follows another.
-
-    A kernel that another child compiles is waited for; one who followed would wait all the time.
-    """
-    first = (k + k % 2) * len(kernels) // (count + count % 2)
-    way = -1 if k % 2 else 1
-    return (kernels[first:] + kernels[:first])[::way]
-
-
-def child(where: str, k: str, count: str) -> None:
-    """Compile all kernels that no other child has compiled, in an order of its own."""
+def child(where: str, k: str) -> None:
+    """Compile every kernel that no other child has begun with; every other child begins at the end."""
+    compiling.set_alone()
+    gc.disable()  # what is compiled is kept to the end: looking for what is not takes 6 % of the time
     Thread(target=_end_with_parent, daemon=True).start()
     folder = Path(where)
     for module in pkgutil.walk_packages([str(_SOLVER)], "brakecli.solver."):
         importlib.import_module(module.name)
-    from brakecli.solver.compile import is_kept, kernels, ready
-    from brakecli.solver.kernel_cache import CACHE
+    from brakecli.solver import kernels
 
-    if folder != CACHE:
-        raise SystemExit(f"the cache is {CACHE}")
-    _write(folder / _TOTAL, str(len(kernels)))
-    for each in _in_turn(kernels, int(k), int(count)):
-        if not is_kept(each):
-            ready(each)
-            if not is_kept(each):
-                raise SystemExit("no more can be written there")
+    if folder != kernels.folder():
+        raise SystemExit(f"the cache is {kernels.folder()}")
+    _write(folder / _TOTAL, str(len(kernels.entries)))
+    for each in kernels.entries[:: -1 if int(k) % 2 else 1]:
+        try:
+            (folder / each.name).mkdir(mode=cache_folder.OURS)
+        except FileExistsError:
+            continue
+        each.load()
+        if not is_sound(folder / each.name):
+            raise SystemExit("no more can be written there")

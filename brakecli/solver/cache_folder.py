@@ -9,8 +9,17 @@ import grp
 import hashlib
 import os
 import pwd
+import shutil
 import stat
+import tempfile
+import time
+import zlib
+from collections.abc import Mapping
+from contextlib import suppress
+from multiprocessing.util import Finalize
 from pathlib import Path
+
+from brakecli.solver import compiling
 
 BASE = "BRAKECLI_CACHES"
 """The environment variable by which a process hands its folder of caches to those that it starts."""
@@ -18,6 +27,91 @@ FOR_OTHERS = stat.S_IWGRP | stat.S_IWOTH
 """Permissions by which others write into a folder."""
 OURS = 0o700
 """Permissions of a folder that is made here, whatever the process hides by its mask."""
+HOW = "BRAKECLI_COMPILE"
+"""The environment variable that says how kernels are compiled."""
+LAZY = "lazy"
+"""Its value for whoever edits the solver: each kernel as it is needed, by the process that needs it."""
+MANIFEST = "manifest.json"
+"""The file in the folder that says what it holds, once it holds all."""
+REMEDY = "name a folder of your own with XDG_CACHE_HOME"
+
+_TEMPORARY = "brakecli-kernels-"  # what the names of temporary caches begin with, before the process
+_STALE = 3600.0  # s
+_LARGEST = 100_000_000  # bytes of a file of the cache
+
+
+def opened(facts: Mapping[str, str]) -> Path | None:
+    """Where machine code is kept that depends on such facts; None where it cannot be.
+
+    Where others could write, or nobody, it is a folder for this process and its workers.
+    """
+    name = f"-{zlib.crc32(repr(sorted(facts.items())).encode()):08x}"
+    folder = None
+    try:
+        folder = prepare(name)
+        if os.access(folder, os.W_OK):
+            return folder
+        raise _refused(folder, "it is read-only")
+    except (OSError, RuntimeError) as error:
+        why = getattr(error, "strerror", None) or str(error)
+        where = getattr(error, "filename", None) or "the folder of caches"
+        what = f"the cache of compiled kernels cannot be used: {why[0].lower()}{why[1:]} (found {where})"
+        compiling.set_trouble(f"{what}; {REMEDY}")
+        return _temporary(name, folder)
+
+
+def _temporary(name: str, like: Path | None) -> Path | None:
+    """A folder that goes with this process, in which it keeps what is needed, also for its workers.
+
+    It begins with what another one holds, where that holds all.
+    """
+    try:
+        _remove_stale()
+        base = tempfile.mkdtemp(prefix=f"{_TEMPORARY}{os.getpid()}-")
+    except OSError:
+        return None
+    Finalize(None, _removed, (base, os.getpid()), exitpriority=0)  # workers end without `atexit`
+    os.environ[BASE] = base
+    try:
+        folder = prepare(name)
+        if like is None or not (like / MANIFEST).is_file():
+            os.environ[HOW] = LAZY
+            return folder
+        for path in sorted(like.rglob("*")):
+            made = folder / path.relative_to(like)
+            if path.is_dir():
+                made.mkdir(mode=OURS)
+            else:
+                made.write_bytes(read(path, _LARGEST))
+    except (OSError, RuntimeError):
+        _removed(base, os.getpid())
+        return None
+    return folder
+
+
+def _remove_stale() -> None:
+    """Remove such folders of processes that were killed: theirs are older than an hour, and they have ended."""
+    for path in Path(tempfile.gettempdir()).glob(f"{_TEMPORARY}*-*"):
+        with suppress(OSError, ValueError):
+            status = path.lstat()
+            owner = int(path.name.removeprefix(_TEMPORARY).partition("-")[0])
+            if status.st_uid == os.geteuid() and time.time() - status.st_mtime > _STALE and not _is_running(owner):
+                shutil.rmtree(path, ignore_errors=True)
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
+
+
+def _removed(folder: str, owner: int) -> None:
+    if os.getpid() == owner:
+        shutil.rmtree(folder, ignore_errors=True)
 
 
 def source_hash(folder: Path = Path(__file__).parent) -> str:
@@ -43,7 +137,7 @@ def prepare(name: str = "") -> Path:
     for each in real.parents:
         refuse_shared(each)
     found = real.lstat()
-    if found.st_uid != os.geteuid() or found.st_mode & FOR_OTHERS:
+    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & FOR_OTHERS:
         raise _refused(folder, "it is not a folder in which this user alone writes")
     return real
 

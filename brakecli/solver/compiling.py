@@ -1,7 +1,8 @@
 """What a program says while kernels are compiled; only the standard library is imported here."""
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 
 Tell = Callable[[int, int], None]
 """Called with how many kernels are there, of how many; both 0 as long as this is not known."""
@@ -12,6 +13,8 @@ _notice: Callable[[str], object] | None = None
 _progress: Progress | None = None
 _warning: Callable[[str], object] | None = None
 _trouble = ""
+_BLAS = "scipy.linalg.cython_blas"
+_alone = False
 
 
 def set_notice(notice: Callable[[str], object] | None) -> None:
@@ -59,3 +62,25 @@ def begins() -> None:
     _notice = None
     if notice is not None:
         notice(_trouble)
+
+
+def set_alone() -> None:
+    """Say that this process has no kernels but ours."""
+    global _alone
+    _alone = True
+
+
+@contextmanager
+def without_blas() -> Iterator[None]:
+    """Let Numba find no BLAS in a process that is alone: its import takes 0.2 s, and none of our kernels calls it.
+
+    Numba imports it with the first kernel that it loads.
+    """
+    hidden = _alone and _BLAS not in sys.modules
+    if hidden:
+        sys.modules[_BLAS] = None  # type: ignore[assignment]  # whoever imports it learns that there is none
+    try:
+        yield
+    finally:
+        if hidden:
+            del sys.modules[_BLAS]

@@ -6,11 +6,8 @@ T. J. Dekker, Numer. Math. 18 (1971) 224-242; the products are split because no 
 
 from fractions import Fraction
 
-from numba import float64, types
+from brakecli.solver.kernels import kernel
 
-from brakecli.solver.compile import kernel
-
-_PAIR = types.UniTuple(float64, 2)
 EPSILON = 2.220446049250313e-16
 """Distance from 1 to the next number."""
 ROUNDING = 4.0 * EPSILON
@@ -24,7 +21,7 @@ def split(value: Fraction) -> tuple[float, float]:
     return high, float(value - Fraction(high))
 
 
-@kernel(_PAIR(float64, float64))
+@kernel
 def two_sum(a: float, b: float) -> tuple[float, float]:
     """a + b, exactly."""
     s = a + b
@@ -32,7 +29,7 @@ def two_sum(a: float, b: float) -> tuple[float, float]:
     return s, (a - (s - v)) + (b - v)
 
 
-@kernel(_PAIR(float64, float64))
+@kernel
 def two_product(a: float, b: float) -> tuple[float, float]:
     """a b, exactly, unless it overflows (above about 1e300)."""
     p = a * b
@@ -45,14 +42,14 @@ def two_product(a: float, b: float) -> tuple[float, float]:
     return p, ((a_high * b_high - p) + a_high * b_low + a_low * b_high) + a_low * b_low
 
 
-@kernel(_PAIR(float64, float64, float64, float64))
+@kernel
 def add(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """(a + a_low) + (b + b_low) to about 32 digits of the larger of the two, not of a difference."""
     s, e = two_sum(a, b)
     return two_sum(s, e + (a_low + b_low))
 
 
-@kernel(_PAIR(float64, float64, float64, float64))
+@kernel
 def multiply(a: float, a_low: float, b: float, b_low: float) -> tuple[float, float]:
     """(a + a_low)(b + b_low) to about 32 digits."""
     p, e = two_product(a, b)

@@ -2,7 +2,7 @@
 
 Every number of a run has neighbours, those of `LANES` - 1 other runs, so that one instruction computes several. In
 all else they are strangers: what the other lanes hold does not change a bit of a run. A run that leaves its lane
-has no result: `motion.solve` computes it.
+has no result: `integrate.solve` computes it.
 """
 
 import math
@@ -15,15 +15,16 @@ from typing import Any
 import numpy as np
 
 from brakecli import stop
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats, ready
 from brakecli.solver.contact.pad import BESIDE, TILE, aligned, build_pad
 from brakecli.solver.energy import NOT_KEPT
+from brakecli.solver.integrate import Motion, OwnError, Work
+from brakecli.solver.kernels import load
 from brakecli.solver.lanes import advance
-from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, PAIR, STEPS, THETA_1, WAVES, Shared
-from brakecli.solver.motion import Motion, OwnError, Work
+from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, PAIR, SHARED, STEPS, THETA_1, WAVES, Shared
 from brakecli.solver.quantities import HISTORY
-from brakecli.solver.records import PARTS
+from brakecli.solver.records import PARTS, new
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.steady_sliding import sliding
@@ -61,8 +62,8 @@ def fits(system: System) -> Hashable | None:
 
 
 @lru_cache(maxsize=4)
-def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> dict[str, Any]:
-    """What `Shared` holds of the surfaces, by its names, for an even number of nodes."""
+def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[dict[str, Any], Floats]:
+    """What `SHARED` holds of the surfaces, by its names, and the table of an even number of nodes."""
     pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
     half = nodes // 2
     waves = np.zeros((WAVES, 3))
@@ -78,14 +79,14 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> di
     table[:, 1] = f1[: -half - 1 : -1]
     for wave, function in np.ndindex(own, 2):
         table[:, 2 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + half]
-    return {
+    numbers = {
         "length": 2.0 * half_length,
         "full_up_to": float(pad.full_up_to),
         "clear_from": float(pad.clear_from),
         "shoe_mean": float(pad.shoe_mean),
         "waves": waves.ravel(),
-        "table": table.ravel(),
     }
+    return numbers, table.ravel()
 
 
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
@@ -99,7 +100,7 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
 
 
 def _run_lanes(systems: list[System]) -> list[Motion | None]:
-    ready(advance)
+    load(advance)
     begin = time.perf_counter()
     alike = systems[0]
     number = len(systems)
@@ -107,7 +108,7 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))
     carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
     sizes = np.ones((PARTS if carried else 0, LANES))
-    advance(o, shared(alike, DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried), rows, sizes)
+    advance(o, *shared(alike, DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried), rows, sizes)
     exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
     seconds = (time.perf_counter() - begin) / number
     motions = list[Motion | None]()
@@ -129,19 +130,21 @@ def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
         return exponents(np.log(np.clip(sizes, LEAST, MOST)), duration)
 
 
-def shared(system: System, first: int, beyond: int) -> Shared:
-    """What a system has in common with others beside it, where the kinds from `first` on are carried along."""
-    return Shared(
-        h=system.step,
-        interval=system.interval,
-        per_sample=system.per_sample,
-        nodes=system.nodes,
-        **_tables(system.half_length, system.shoe, system.wheel, system.nodes),
-        gaps=aligned(PAIR * (system.nodes // 2 + 3)),
-        signals=np.frombuffer(stop.memory, np.uint8).ctypes.data,
-        first=first,
-        beyond=beyond,
-    )
+def shared(system: System, first: int, beyond: int) -> tuple[Shared, Floats]:
+    """What a system has in common with others beside it, where the kinds from `first` on are carried along.
+
+    The second are its tables, with room for the gaps.
+    """
+    made = new(SHARED)
+    values, table = _tables(system.half_length, system.shoe, system.wheel, system.nodes)
+    values = values | {"h": system.step, "interval": system.interval, "per_sample": system.per_sample}
+    values |= {"nodes": system.nodes, "first": first, "beyond": beyond, "gaps_at": table.size}
+    values["signals"] = np.frombuffer(stop.memory, np.uint8).ctypes.data
+    for name, value in values.items():
+        made[name] = value
+    tables = aligned(table.size + PAIR * (system.nodes // 2 + 3))
+    tables[: table.size] = table
+    return made, tables
 
 
 def filled(systems: Sequence[System]) -> Any:

@@ -1,14 +1,12 @@
 """Amontons friction, set-valued: the minimisation that every step of every scheme comes down to, (14)-(17)."""
 
-from numba import boolean, float64, types
-
-from brakecli.solver.compile import kernel
+from brakecli.solver.kernels import kernel
 from brakecli.solver.quantities import ContactState
 
 _BACKWARD, _STICK, _FORWARD, _SEPARATED = (float(state) for state in ContactState)  # compiled code knows no enums
 
 
-@kernel(types.UniTuple(float64, 3)(float64, float64, float64, float64, float64, float64, float64))
+@kernel
 def minimise(
     a_11: float, a_12: float, a_22: float, g_1: float, g_2: float, g_0: float, belt: float
 ) -> tuple[float, float, float]:
@@ -26,7 +24,7 @@ def minimise(
     return belt, (g_2 - a_12 * belt) / a_22, 0.0  # Eq. (17)
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, float64, float64, float64))
+@kernel
 def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tuple[float, float]:
     """Derivatives of d and e, (15)-(17), by the normal force F (g2 grows with F, g0 with phi F), on a `side`."""
     if side == 0.0:
@@ -35,7 +33,7 @@ def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tu
     return (-a_12 - side * phi * a_22) / a, (a_11 + side * phi * a_12) / a
 
 
-@kernel(types.UniTuple(float64, 2)(float64, boolean, float64, float64, float64))
+@kernel
 def observed(sliding: float, holds: bool, needed: float, normal: float, bound: float) -> tuple[float, float]:
     """State of the contact and friction force (N); `needed` keeps the shoe in stick, if friction `holds` it.
 

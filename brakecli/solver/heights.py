@@ -10,13 +10,13 @@ that their number hardly matters, nor how long a run lasts; a height does not de
 import math
 
 import numpy as np
-from numba import float64, int64, types, void
 
-from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import BESIDE, POINTS, TILE
 from brakecli.solver.double_double import two_product
-from brakecli.solver.records import LAYER, Layer
-from brakecli.solver.roughness import wheel_angles
+from brakecli.solver.kernels import FAST, kernel, stopped
+from brakecli.solver.records import Layer
+from brakecli.solver.roughness import turn_to
 from brakecli.solver.sine import sine_cosine
 
 FARTHEST = 4e18
@@ -25,14 +25,14 @@ WEIGHTS = np.array([-((-1.0) ** i) * math.comb(POINTS - 1, i) / math.factorial(P
 """Lagrange's, without what depends on the place."""
 
 
-@kernel(void(vector, vector, float64, float64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _add_wave(f2: Floats, table: Floats, s: float, c: float) -> None:
     """Add g sin(ωξ + ψ) at the nodes of a tile, by addition from the tables of g sin(ωξ) and g cos(ωξ)."""
     for j in range(TILE):
         f2[j] += c * table[j] + s * table[j + TILE]
 
 
-@kernel(void(vector, vector, vector, vector), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
     """Add five waves at once: f2 is read and written only once."""
     s_0 = s[0]
@@ -56,29 +56,30 @@ def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
         f2[j] += one + two + c_4 * table[j + 8 * TILE] + s_4 * table[j + 9 * TILE]
 
 
-@kernel(types.UniTuple(vector, 2)(float64, LAYER))
-def phases(x: float, layer: Layer) -> tuple[Floats, Floats]:
-    """Sine and cosine of the phase ωx + ψ of each wave; they come eight at a time."""
+@kernel
+def phases(x: float, layer: Layer, tables: Floats, scratch: Floats) -> tuple[int, int]:
+    """Sine and cosine of the phase ωx + ψ of each wave, eight at a time; where in the scratch they begin."""
     pad = layer.pad
     waves = layer.pad.wheel_terms
     at = pad.nodes + 2 * BESIDE + 2 * TILE
     omega_at = pad.wheel_at + waves
     eights = (waves + 7) // 8 * 8
-    sines = layer.scratch[at : at + eights]
-    cosines = layer.scratch[at + eights : at + 2 * eights]
+    sines = scratch[at : at + eights]
+    cosines = scratch[at + eights : at + 2 * eights]
     for i in range(waves):
-        sines[i] = layer.tables[omega_at + i] * x + layer.angles[i]
+        sines[i] = tables[omega_at + i] * x + scratch[layer.angles_at + i]
     for i in range(eights):
         sines[i], cosines[i] = sine_cosine(sines[i])
-    return sines, cosines
+    return at, at + eights
 
 
-@kernel(void(float64, vector, LAYER))
-def _sum_waves(x: float, f2: Floats, layer: Layer) -> None:
+@kernel
+def _sum_waves(x: float, f2: Floats, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """f2 = Σ g sin(ω(ξ + x) + ψ) where the shoe is at x, in whole tiles."""
     pad = layer.pad
-    tables = layer.tables
-    sines, cosines = phases(x, layer)
+    sines_at, cosines_at = phases(x, layer, tables, scratch)
+    sines = scratch[sines_at:cosines_at]
+    cosines = scratch[cosines_at : 2 * cosines_at - sines_at]
     waves = pad.wheel_terms
     at = pad.waves_at
     for begin in range(0, f2.size, TILE):
@@ -98,46 +99,47 @@ def _sum_waves(x: float, f2: Floats, layer: Layer) -> None:
             at = at + 2 * TILE
 
 
-@kernel(void(int64, LAYER), inlined=False)
-def _fill(tile: int, layer: Layer) -> None:
+@kernel
+def _fill(tile: int, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """The heights in a tile of the window."""
-    layer = borrowed(layer)
     pad = layer.pad
     window = layer.window
     n = layer.pad.wheel_terms
+    angles = scratch[layer.angles_at : layer.angles_at + n]
     travel, travel_low = two_product(-float(TILE * tile), window.rows * window.spacing)
-    wheel_angles(layer.tables[pad.turns_at : pad.turns_at + 3 * n], travel, travel_low, layer.angles)
+    turn_to(tables[pad.turns_at : pad.turns_at + 3 * n], travel, travel_low, angles)
     for row in range(window.rows):
         at = window.at + row * window.width + TILE * (tile - window.origin)
-        _sum_waves(row * window.spacing, layer.scratch[at : at + TILE], layer)
+        _sum_waves(row * window.spacing, scratch[at : at + TILE], layer, tables, scratch)
 
 
-@kernel(void(int64, int64, LAYER))
-def _cover(low: int, high: int, layer: Layer) -> None:
+@kernel
+def _cover(low: int, high: int, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """See that the window has the tiles from low to high; if it has to move, most of it lies ahead."""
     window = layer.window
     tiles = window.width // TILE
     if low < window.origin or high >= window.origin + tiles:
         window.origin = high + 2 - tiles if low < window.origin else low - 1
         window.first = window.end = low
-    while window.first > low:
-        window.first -= 1
-        _fill(window.first, layer)
-    while window.end <= high:
-        _fill(window.end, layer)
-        window.end += 1
+    while window.first > low or window.end <= high:
+        if window.first > low:
+            window.first -= 1
+            tile = window.first
+        else:
+            tile = window.end
+            window.end += 1
+        _fill(tile, layer, tables, scratch)
 
 
-@kernel(vector(int64, int64, LAYER))
-def _row(point: int, size: int, layer: Layer) -> Floats:
-    """The heights at a point of the grid and, a node's spacing further each, at the points that follow."""
+@kernel
+def _row(point: int, layer: Layer) -> int:
+    """Where the heights begin at a point of the grid and, a node's spacing further each, at those that follow."""
     window = layer.window
     column = (point >> window.shift) - TILE * window.origin
-    begin = window.at + (point & (window.rows - 1)) * window.width + column
-    return layer.scratch[begin : begin + size]
+    return window.at + (point & (window.rows - 1)) * window.width + column  # type: ignore[no-any-return]
 
 
-@kernel(void(float64, vector), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _weigh(part: float, weights: Floats) -> None:
     """Lagrange's weights of the points, this part of the way from the last one of the first half to the next.
 
@@ -150,22 +152,22 @@ def _weigh(part: float, weights: Floats) -> None:
         weights[i] = product * WEIGHTS[i] / (part - (i - POINTS // 2 + 1))
 
 
-@kernel(void(int64, vector, vector, LAYER), fastmath=FAST)
-def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer) -> None:
+@kernel(fastmath=FAST)
+def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer, scratch: Floats) -> None:
     """f2 as the weighted sum of `POINTS` heights, the first at a point of the grid."""
     size = f2.size
-    r_0 = _row(begin, size, layer)
-    r_1 = _row(begin + 1, size, layer)
-    r_2 = _row(begin + 2, size, layer)
-    r_3 = _row(begin + 3, size, layer)
-    r_4 = _row(begin + 4, size, layer)
-    r_5 = _row(begin + 5, size, layer)
-    r_6 = _row(begin + 6, size, layer)
-    r_7 = _row(begin + 7, size, layer)
-    r_8 = _row(begin + 8, size, layer)
-    r_9 = _row(begin + 9, size, layer)
-    r_10 = _row(begin + 10, size, layer)
-    r_11 = _row(begin + 11, size, layer)
+    r_0 = scratch[_row(begin, layer) :]
+    r_1 = scratch[_row(begin + 1, layer) :]
+    r_2 = scratch[_row(begin + 2, layer) :]
+    r_3 = scratch[_row(begin + 3, layer) :]
+    r_4 = scratch[_row(begin + 4, layer) :]
+    r_5 = scratch[_row(begin + 5, layer) :]
+    r_6 = scratch[_row(begin + 6, layer) :]
+    r_7 = scratch[_row(begin + 7, layer) :]
+    r_8 = scratch[_row(begin + 8, layer) :]
+    r_9 = scratch[_row(begin + 9, layer) :]
+    r_10 = scratch[_row(begin + 10, layer) :]
+    r_11 = scratch[_row(begin + 11, layer) :]
     w_0 = w[0]
     w_1 = w[1]
     w_2 = w[2]
@@ -186,8 +188,8 @@ def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer) -> None:
         f2[j] = one + two + three + four
 
 
-@kernel(void(float64, vector, LAYER))
-def _interpolate(x: float, f2: Floats, layer: Layer) -> None:
+@kernel
+def _interpolate(x: float, f2: Floats, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """f2 where the shoe is at x, from the window."""
     window = layer.window
     shift = layer.window.shift
@@ -196,20 +198,21 @@ def _interpolate(x: float, f2: Floats, layer: Layer) -> None:
     point = whole - window.points
     begin = (int(point) if abs(point) < FARTHEST else 0) - POINTS // 2 + 1
     last = (begin + POINTS - 1 >> shift) + f2.size - 1
-    _cover((begin >> shift) // TILE, last // TILE, layer)
-    weights = layer.scratch[window.at - POINTS : window.at]
+    _cover((begin >> shift) // TILE, last // TILE, layer, tables, scratch)
+    weights = scratch[window.at - POINTS : window.at]
     _weigh(max(place - whole, 1e-200), weights)  # at no point, where it would divide by zero
-    _add_rows(begin, weights, f2, layer)
+    _add_rows(begin, weights, f2, layer, scratch)
 
 
-@kernel(types.UniTuple(vector, 2)(float64, LAYER))
-def profiles(x: float, layer: Layer) -> tuple[Floats, Floats]:
-    """f1 at the nodes, and f2 with those beside them; not to be used where the process is to end."""
-    pad = layer.pad
-    n = pad.nodes
-    f2 = layer.scratch[: (n + 2 * BESIDE + TILE - 1) // TILE * TILE]
+@kernel
+def profiles(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """The heights f2 at the nodes and beside them, from the begin of the scratch on.
+
+    They are not to be used where the process is to end. Those of f1 are in the tables.
+    """
+    n = layer.pad.nodes
+    f2 = scratch[: (n + 2 * BESIDE + TILE - 1) // TILE * TILE]
     if layer.window.rows == 0:
-        _sum_waves(x, f2, layer)
+        _sum_waves(x, f2, layer, tables, scratch)
     else:
-        _interpolate(x, f2[: n + 2 * BESIDE], layer)
-    return layer.tables[pad.nodes_at : pad.nodes_at + n], f2
+        _interpolate(x, f2[: n + 2 * BESIDE], layer, tables, scratch)

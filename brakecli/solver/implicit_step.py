@@ -8,11 +8,12 @@ the paper's iteration, (13) and (24), which contracts by about gain * 2ak/a22 an
 import math
 from typing import Any
 
-from numba import boolean, float64, types
-
-from brakecli.solver.compile import at_address, borrowed, kernel
+from brakecli.solver.arrays import Floats
+from brakecli.solver.contact.force import evaluate
 from brakecli.solver.friction import minimise, slopes
-from brakecli.solver.records import EVALUATE, LAYER, PROBLEM_TYPE, SOLVE, Layer
+from brakecli.solver.kernels import kernel
+from brakecli.solver.method import MOST_EVALUATIONS
+from brakecli.solver.records import Layer
 
 SOLVED = 0
 UNCONVERGED = 1
@@ -20,22 +21,26 @@ _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""
 
+_FIXED_POINT = list(MOST_EVALUATIONS).index("fixed-point")
 _ROUNDING = 4e-16  # of a height in the contact: twice that of a sum
 _OPENED = 10.0  # times the force, up to which a bracket without an upper end is opened; a choice
 _RUN_AWAY = 1e200  # N: a force whose square is no number
 _REACH = 2.0
 """How far the gap may move in the next step, over how far it has moved in the last."""
 
-_evaluate_at = at_address(EVALUATE)
+
+@kernel(inline=False)
+def _touch(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """Evaluate the contact: compiled once for both iterations."""
+    evaluate(x, y, layer, tables, scratch)
 
 
-@kernel(types.UniTuple(float64, 2)(LAYER, PROBLEM_TYPE, float64))
-def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
+@kernel
+def _try_force(layer: Layer, tables: Floats, scratch: Floats, problem: Any, f: float) -> tuple[float, float]:
     """Minimise for the normal force f, evaluate the contact there; the residual and the rounding in it (N).
 
     The residual is r(f) = F_y(x_0 + gain d, y_0 + gain e) - f.
     """
-    layer = borrowed(layer)
     a_11 = problem.a_11
     a_12 = problem.a_12
     a_22 = problem.a_22
@@ -47,13 +52,13 @@ def _try_force(layer: Layer, problem: Any, f: float) -> tuple[float, float]:
     problem.normal_force = f
     problem.d_slope, problem.e_slope = slopes(a_11, a_12, a_22, phi, side)
     y = problem.y_0 + problem.gain * e
-    _evaluate_at(layer.evaluate)(problem.x_0 + problem.gain * d, y, layer)
+    _touch(problem.x_0 + problem.gain * d, y, layer, tables, scratch)
     problem.residual = layer.contact.normal_force - f
     rounding = _ROUNDING * layer.contact.stiffness * (abs(problem.y_0) + abs(problem.gain * e))
     return problem.residual, rounding
 
 
-@kernel(boolean(LAYER, PROBLEM_TYPE, float64, float64))
+@kernel
 def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> bool:
     """Take the force f if the last evaluation proves that its residual is at most `allowed` (N); whether it does.
 
@@ -90,8 +95,8 @@ def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> b
     return True
 
 
-@kernel(SOLVE)
-def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
+@kernel
+def newton(layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: int) -> tuple[int, int, int]:
     """Bracketed Newton iteration from the guess problem.normal_force >= 0; (outcome, evaluations, rising points).
 
     F becomes F - r/r' with r' = gain (∂F_y/∂x d' + ∂F_y/∂y e') - 1. A rising point is one where the residual does
@@ -99,7 +104,6 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     always one: where F = 0 the residual is not negative, and for a large F, since a11 a22 > a12², the shoe either
     sticks and lifts off or slips and lifts off.
     """
-    layer = borrowed(layer)
     contact = layer.contact
     low = 0.0
     high = math.inf
@@ -107,7 +111,7 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     rising = 0
     before_last = last = math.inf  # lengths of steps
     for evaluation in range(1, most + 1):
-        r, rounding = _try_force(layer, problem, f)
+        r, rounding = _try_force(layer, tables, scratch, problem, f)
         gain = problem.gain
         if gain == 0.0:  # explicit: the contact does not depend on this step's unknowns
             f = contact.normal_force
@@ -146,18 +150,28 @@ def newton(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
     return UNCONVERGED, most, rising
 
 
-@kernel(SOLVE)
-def fixed_point(layer: Layer, problem: Any, most: int) -> tuple[int, int, int]:
+@kernel
+def fixed_point(layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: int) -> tuple[int, int, int]:
     """The paper's iteration, (13) and (24), from d(0) = dⁿ, e(0) = eⁿ; (outcome, evaluations, 0)."""
     contact = layer.contact
     gain = problem.gain
-    _evaluate_at(layer.evaluate)(problem.x_0 + gain * problem.d, problem.y_0 + gain * problem.e, layer)
+    _touch(problem.x_0 + gain * problem.d, problem.y_0 + gain * problem.e, layer, tables, scratch)
     f = contact.normal_force
     for evaluation in range(2, most + 1):
-        r, rounding = _try_force(layer, problem, f)  # Eq. (13), Eq. (24)
+        r, rounding = _try_force(layer, tables, scratch, problem, f)  # Eq. (13), Eq. (24)
         if abs(r) <= _RELATIVE * max(f, contact.normal_force) + rounding:
             return SOLVED, evaluation, 0
         f = contact.normal_force
         if not f < _RUN_AWAY:
             return UNCONVERGED, evaluation, 0
     return UNCONVERGED, most, 0
+
+
+@kernel
+def solve(
+    layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: int, iteration: int
+) -> tuple[int, int, int]:
+    """One step by an iteration of `method.MOST_EVALUATIONS`; (outcome, evaluations, rising points)."""
+    if iteration == _FIXED_POINT:
+        return fixed_point(layer, tables, scratch, problem, most)
+    return newton(layer, tables, scratch, problem, most)

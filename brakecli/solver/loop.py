@@ -1,17 +1,19 @@
 """The only time loop: steps a state, and samples it on a fixed interval whatever the step."""
 
 import math
+from typing import Any
 
-from numba import float64, int64, void
-
-from brakecli.solver.automaton import FORWARD, OPEN, STICK, UNDECIDED
-from brakecli.solver.compile import Floats, at_address, borrowed, from_memory, into_memory, kernel, stopped, vector
+from brakecli.solver.arrays import ROWS, VECTOR, Floats
+from brakecli.solver.contact.force import evaluate
 from brakecli.solver.friction import observed
-from brakecli.solver.implicit_step import SOLVED
+from brakecli.solver.implicit_step import SOLVED, solve
+from brakecli.solver.kernels import entry, kernel, stopped
+from brakecli.solver.motion.phases import FORWARD, OPEN, STICK, UNDECIDED
+from brakecli.solver.plant import PLANT, Plant
 from brakecli.solver.quantities import BOUND, Failure
-from brakecli.solver.records import EVALUATE, FINISH, PLANT, PREPARE, SOLVE, Plant
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
+from brakecli.solver.schemes.steps import finish, prepare
 from brakecli.solver.tangent import kept, meet, renew
 from brakecli.solver.tangent import solve as solve_disturbed
 from brakecli.solver.track import enter, mark, put, turned
@@ -19,21 +21,14 @@ from brakecli.solver.track import enter, mark, put, turned
 _ROUNDING = 1e-15  # of velocities, some units
 _NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
 
-_evaluate_at, _prepare_at, _finish_at, _solve_at = (
-    at_address(signature) for signature in (EVALUATE, PREPARE, FINISH, SOLVE)
-)
-hold = into_memory(PLANT)
-_plant_at = from_memory(PLANT)
 
-
-@kernel(void(PLANT, int64, float64), inlined=False)
-def _mark(p: Plant, number: int, t: float) -> None:
+@kernel(inline=False)
+def _mark(p: Plant, tables: Floats, scratch: Floats, number: int, t: float) -> None:
     """Make a mark at a sample, whose contact has been evaluated.
 
     A scheme that lags has its energies half a step behind. The contact's is continued up to there: another
     evaluation would change what the next one begins with.
     """
-    p = borrowed(p)
     state = p.state
     track = p.track
     contact = p.layer.contact
@@ -42,11 +37,11 @@ def _mark(p: Plant, number: int, t: float) -> None:
     slid = 0.0
     dy = 0.0
     if lag == 1:
-        slid = 0.5 * (state.x - state.x_old) - after * value_at(p.drive.belt, t)
+        slid = 0.5 * (state.x - state.x_old) - after * value_at(scratch[p.drive.belt_at : p.drive.belt_end], t)
         dy = 0.5 * (state.y - state.y_old)
     store = contact.store + contact.store_x * slid - contact.normal_force * dy
     store += (0.5 * contact.stiffness * dy - contact.tangential * slid) * dy
-    at = mark(track, p.work, number, p.grid.samples, t + after, store)
+    at = track.states[mark(track, p.work, number, p.grid.samples, t + after, store)]
     at[0] = state.x
     at[1] = state.y
     at[2] = state.v_x
@@ -55,18 +50,16 @@ def _mark(p: Plant, number: int, t: float) -> None:
     at[5] = state.y_old
 
 
-@kernel(void(PLANT, vector))
-def sample(p: Plant, row: Floats) -> None:
+@kernel
+def sample(p: Plant, tables: Floats, scratch: Floats, row: Floats) -> None:
     """Write the sample that is due at this level: the motion, and the forces at its own time.
 
     F_y is evaluated at the sample; F_x follows from the slip law, or in stick from (6) with the wheel's
     acceleration. In stick a three-layer scheme's velocity leaves U at every other level, by no more than friction
     changes it in a step: it sticks there, too, while the force needed lies inside the friction cone.
     """
-    p = borrowed(p)
     c = p.c
     grid = p.grid
-    drive = p.drive
     state = p.state
     contact = p.layer.contact
     number = (p.counts.level - grid.lag) // grid.per_sample
@@ -74,16 +67,16 @@ def sample(p: Plant, row: Floats) -> None:
     x, y = (state.x, state.y) if grid.lag == 0 else (state.x_old, state.y_old)
     v_x = state.v_x
     v_y = state.v_y
-    belt = value_at(drive.belt, t)
+    belt = value_at(scratch[p.drive.belt_at : p.drive.belt_end], t)
     if p.layer.pad.wheel_terms > 0:
-        travel, travel_low = integral_at(drive.belt, t, 0.0)
-        turn(travel, travel_low, p.layer)
-    _evaluate_at(p.layer.evaluate)(x, y, p.layer)
+        travel, travel_low = integral_at(scratch[p.drive.belt_at : p.drive.belt_end], t, 0.0)
+        turn(travel, travel_low, p.layer, tables, scratch)
+    evaluate(x, y, p.layer, tables, scratch)
     p.counts.evaluations += 1
     normal = contact.normal_force
     bound = c.phi * normal
-    belt_slope = slope_at(drive.belt, t)
-    load = value_at(drive.load, t)
+    belt_slope = slope_at(scratch[p.drive.belt_at : p.drive.belt_end], t)
+    load = value_at(scratch[p.drive.load_at : p.drive.load_end], t)
     sliding = v_x - belt
     if abs(sliding) <= _ROUNDING * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
         sliding = 0.0
@@ -101,10 +94,10 @@ def sample(p: Plant, row: Floats) -> None:
     row[6] = contact.fraction
     row[7] = side
     if p.track.on == 1 and number >= p.track.next:
-        _mark(p, number, t)
+        _mark(p, tables, scratch, number, t)
 
 
-@kernel(float64(PLANT))
+@kernel
 def _needed(p: Plant) -> float:
     """The friction force (N) that it takes to stick, where the step that has been taken has its forces.
 
@@ -125,8 +118,8 @@ def _needed(p: Plant) -> float:
     return needed + (c.c_xx * x + c.c_xy * y + problem.load * c.sin_beta)  # type: ignore[no-any-return]
 
 
-@kernel(float64(PLANT, float64, float64))
-def _margin_rate(p: Plant, t: float, needed: float) -> float:
+@kernel
+def _margin_rate(p: Plant, scratch: Floats, t: float, needed: float) -> float:
     """How fast φ F_y - |needed| falls or rises, where the margin of a stuck shoe runs out (N/s).
 
     The rate of `needed` follows from (6), with ÿ by (7).
@@ -139,21 +132,20 @@ def _margin_rate(p: Plant, t: float, needed: float) -> float:
     belt = problem.belt
     force = problem.normal_force
     belt_slope = (problem.belt_next - problem.belt_now) / h
-    load_slope = slope_at(p.drive.load, t)
+    load_slope = slope_at(scratch[p.drive.load_at : p.drive.load_end], t)
     against_y = c.b_xy * belt + c.b_yy * v_y + c.c_xy * state.x + c.c_yy * state.y + problem.load * c.cos_beta
     change = c.c_xx * belt + c.c_xy * v_y + c.b_xx * belt_slope + c.b_xy * (force - against_y) / c.m
     change += load_slope * c.sin_beta
     return c.phi * (force - state.force_before) / h - math.copysign(1.0, needed) * change  # type: ignore[no-any-return]
 
 
-@kernel(void(PLANT, int64, float64, float64, float64), inlined=False)
-def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> None:
+@kernel(inline=False)
+def _follow(p: Plant, scratch: Floats, phase: int, t: float, v_before: float, before: float) -> None:
     """Note the events of the step from time t on, which has been taken, see `solver.track`.
 
     `phase` is what its solution says, v_before the velocity before and `before` its excess over the wheel's (m/s).
     A stick begins where m |vx - U| = t (bound ± needed), and ends where bound - |needed| = 0 by its rate.
     """
-    p = borrowed(p)
     c = p.c
     track = p.track
     state = p.state
@@ -185,7 +177,7 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
         at = reached - h + (h * to_go / change if to_go < change else h)
         track.began = at
     elif phase == FORWARD and was == STICK:
-        rate = _margin_rate(p, t, needed)
+        rate = _margin_rate(p, scratch, t, needed)
         late = min(margin / rate, 2.0 * h) if margin < 0.0 and rate < 0.0 else 0.0
         at = max(at - late, track.began)
     if phase == OPEN and was != OPEN:
@@ -206,14 +198,13 @@ def _follow(p: Plant, phase: int, t: float, v_before: float, before: float) -> N
         put(track, kind, reached - rest, x - 0.5 * rest * v_x)
 
 
-@kernel(void(PLANT, float64, float64), inlined=False)
+@kernel(inline=False)
 def _disturb(p: Plant, before: float, after: float) -> None:
     """Carry the disturbance along the step that has been taken, with the sliding velocities at both ends.
 
     Where friction changes from one side to another, (6) gives how far into the step: θ = m |vx - U|/(h (bound +
     side needed)). There a part of the disturbed velocity is kept; before, friction was that of the other side.
     """
-    p = borrowed(p)
     c = p.c
     t = p.tangent
     problem = p.problem
@@ -244,9 +235,9 @@ def _disturb(p: Plant, before: float, after: float) -> None:
         beside.state.x_old = beside.state.x
     b = beside.state
     v_x = (b.x - b.x_old) / h if lag == 1 else b.v_x
-    _prepare_at(p.plug.prepare)(c, p.s, beside.state, beside.problem)
+    prepare(p, beside.state, beside.problem)
     solve_disturbed(c, beside, problem, side, contact.stiffness, contact.tangential)
-    _finish_at(p.plug.finish)(c, p.s, beside.state, beside.problem, beside.contact, beside.work)
+    finish(p, beside.state, beside.problem, beside.contact, beside.work)
     if part > 0.0 and theta > 0.0:  # up to the event friction was that of the other side
         behind = ((b.x - b.x_old) / h - v_x if lag == 1 else b.v_x - v_x) / h
         ahead = behind + (side - was) * c.phi * beside.problem.normal_force / c.m
@@ -255,7 +246,7 @@ def _disturb(p: Plant, before: float, after: float) -> None:
         b.v_x = b.v_x + change
 
 
-@kernel(void(PLANT, int64), inlined=False)
+@kernel(inline=False)
 def _renew(p: Plant, number: int) -> None:
     """Note the growth of the disturbance up to a sample, and begin anew with one of size one."""
     t = p.tangent
@@ -274,30 +265,13 @@ def _renew(p: Plant, number: int) -> None:
     b.v_y = t.v_y
 
 
-@kernel(void(PLANT, float64, float64))
-def _count(p: Plant, before: float, after: float) -> None:
-    """Count how the shoe slides or sticks in a step, with the sliding velocities at both ends (m/s)."""
-    counts = p.counts
-    force = p.problem.normal_force
-    if before * after <= 0.0 and force > 0.0:
-        counts.turns += 1
-    if after == 0.0:
-        counts.held += 1
-    else:
-        if counts.held <= 1 and after * counts.side < 0.0:  # turned, with a step in stick at most
-            counts.crossing = max(counts.crossing, force)
-        counts.side = math.copysign(1.0, after)
-        counts.held = 0
-
-
-@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
-def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
+@entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
+def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
 
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.
     """
-    p: Plant = _plant_at(address)
-    c = p.c
+    p = plants[0]
     s = p.s
     grid = p.grid
     layer = p.layer
@@ -305,18 +279,17 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
     problem = p.problem
     counts = p.counts
     track = p.track
-    prepare = _prepare_at(p.plug.prepare)
-    finish = _finish_at(p.plug.finish)
-    solve = _solve_at(p.plug.solve)
-    belt = p.drive.belt
+    belt = scratch[p.drive.belt_at : p.drive.belt_end]
+    load = scratch[p.drive.load_at : p.drive.load_end]
     row = 0
     due = grid.lag % grid.per_sample
     sampled = counts.level // grid.per_sample
     part = counts.level % grid.per_sample
-    problem.belt_next = value_at(belt, grid.interval * sampled + part * s.h)
+    if counts.level == grid.lag:  # later it is that of the step before, to the last bit
+        problem.belt_next = value_at(belt, grid.interval * sampled + part * s.h)
     while counts.level < stop:
         if part == due:
-            sample(p, rows[row])
+            sample(p, tables, scratch, rows[row])
             row += 1
             if p.tangent.on == 1:
                 _renew(p, sampled)
@@ -325,16 +298,16 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         t_low = (part + grid.weighted) * s.h
         problem.belt_now = problem.belt_next
         problem.belt_next = value_at(belt, t + (part + 1) * s.h)
-        problem.load = value_at(p.drive.load, t + t_low)
+        problem.load = value_at(load, t + t_low)
         if layer.pad.wheel_terms > 0:
             travel, travel_low = integral_at(belt, t, t_low)
-            turn(travel, travel_low, layer)
-        prepare(c, s, state, problem)
+            turn(travel, travel_low, layer, tables, scratch)
+        prepare(p, state, problem)
         if state.force > 0.0:  # the guess lies on the parabola through the last three forces
             problem.normal_force = max(3.0 * (state.force - state.force_before) + state.force_earlier, 0.0)
         state.force_earlier = state.force_before
         state.force_before = state.force
-        outcome, evaluations, rising = solve(layer, problem, grid.most)
+        outcome, evaluations, rising = solve(layer, tables, scratch, problem, grid.most, grid.iteration)
         counts.evaluations, counts.most = counts.evaluations + evaluations, max(counts.most, evaluations)
         counts.rising += 1 if rising > 0 else 0
         if outcome != SOLVED:
@@ -348,7 +321,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             return _NOT_CLOSED
         v_before = state.v_x
         before = state.v_x - problem.belt_now
-        finish(c, s, state, problem, layer.contact, p.work)
+        finish(p, state, problem, layer.contact, p.work)
         after = state.v_x - problem.belt_next
         if p.tangent.on == 1:
             _disturb(p, before, after)
@@ -356,9 +329,13 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
             phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
             if phase != track.phase or not state.v_x * track.way > 0.0:
                 _follow(
-                    p, phase, t + part * s.h, v_before, before + grid.lag * (problem.belt_next - problem.belt_now)
+                    p,
+                    scratch,
+                    phase,
+                    t + part * s.h,
+                    v_before,
+                    before + grid.lag * (problem.belt_next - problem.belt_now),
                 )
-        _count(p, before, after)
         if not abs(state.x) + abs(state.y) + abs(state.v_x) + abs(state.v_y) < BOUND:
             return _DIVERGED
         counts.kinds[layer.contact.kind] += 1
@@ -371,3 +348,7 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
         if stopped(layer.pad.signals):
             break
     return _NONE
+
+
+take_sample = entry(None, PLANT, VECTOR, VECTOR, VECTOR)(sample)
+"""`sample`, for Python."""

@@ -1,11 +1,6 @@
-"""The motions of schemes that find their steps themselves: records that they step, and the order of components."""
-
-import numba
+"""The motion of the event-driven scheme: the record that it steps."""
 
 from brakecli.solver.records import record
-
-X, Y, V_X, V_Y = range(4)
-"""Components of an event-driven motion, the last index of its arrays."""
 
 STAGES = 16
 POWERS = 7
@@ -46,58 +41,3 @@ MOTION = record(
     work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W
 )
 """An event-driven motion and its last step."""
-
-BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(4, 8)
-"""Further components of a piecewise-exact motion, beside those of an event-driven one: U, Q and their slopes."""
-
-SIZE = 8
-PHASES = 4
-MARGINS = 3
-WORKS = 4
-TERMS = 18
-NODES = 6
-"""Its components, phases, margins of a phase, works, terms of its series, nodes of its quadrature."""
-PAIRS = SIZE * (SIZE + 1) // 2
-"""Products of two components."""
-AHEAD = 4 + 2 * MARGINS + 2
-"""What a step computes: x, y, v_x and v_y, the margins, their slopes times the step, and 2 to fill up vectors."""
-
-FLOW = record(
-    "x y v_x v_y",  # motion at the level reached, m and m/s
-    "force",  # normal force at the start, N
-    "stiffness",  # of the contact, N/m
-    "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
-    "knot",  # time from which on speed or load change otherwise, s
-    "events_time",  # since which `events` are counted, s
-    "beyond",  # time that the motion is beyond the level reached, s; 0 at samples
-    phase=int,
-    started=int,  # 0 before the phase of the start is known
-    events=int,  # events without progress
-    made=(int, PHASES),  # 1 where the matrices of a phase are made, 2 where the forms of its works are, too
-    row=(float, 8),  # the sample at the level reached
-    z=(float, SIZE),  # motion reached
-    error=(float, 4),  # of x, y, v_x and v_y by the rounding of all steps so far
-    worst=(float, 4),  # its largest size at a sample
-    largest=(float, 4),  # that of the motion
-    before=(float, AHEAD),  # the motion reached with its margins
-    after=(float, AHEAD),  # that at the end of a step
-    needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
-    generator=(float, (PHASES, SIZE, SIZE)),  # A
-    friction=(float, (PHASES, SIZE)),  # row of the friction force, N
-    margins=(float, (PHASES, SIZE, AHEAD)),  # columns of `before`: z, then the margins of a phase
-    step=(float, (PHASES, SIZE, AHEAD)),  # the same times exp(A h), which give `after`
-    now=(float, (SIZE, AHEAD)),  # those of the present phase: at a fixed place, the compiler makes vectors of them
-    works=(float, (PHASES, WORKS, SIZE, SIZE)),  # forms in z that are the works of a step from z on, J
-    factors=(float, (5, NODES, SIZE)),  # what powers at the nodes of Gauss' rule are products of
-    series=(float, (TERMS, SIZE)),  # of each component over the span of a step
-    flow=(float, (TERMS, 4, SIZE)),  # the series of exp(A h): its rows for x, y, v_x and v_y
-    rows=(float, (4, SIZE)),  # those of exp(A t) at the end of a step, or at a node of Gauss' rule
-    at=(float, SIZE),  # the motion at a part of the span
-    sums=(float, PAIRS),  # products of components of z, added up over the steps that wait
-    polynomial=(float, (2, TERMS)),  # a margin on it, and the margin's slope, negative
-    waiting=int,  # 1 where works of whole steps do; further up, it would push vectors across lines of the cache
-)
-"""A piecewise-exact motion with the matrices of its phases."""
-
-MOTION_TYPE = numba.from_dtype(MOTION)
-FLOW_TYPE = numba.from_dtype(FLOW)

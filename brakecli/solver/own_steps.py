@@ -1,10 +1,9 @@
-"""What schemes have in common that find their steps themselves: the sample that is due waits in their state."""
+"""What schemes have in common that find their steps themselves."""
 
 from typing import Any
 
-from brakecli.solver.compile import Floats
 from brakecli.solver.energy import energy_at_level
-from brakecli.solver.records import Pair, Plant, Weights
+from brakecli.solver.records import Pair, Weights
 
 LAG = 0
 MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
@@ -21,8 +20,3 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     """The initial state; its phase is found with the first step."""
     state.x, state.y = position
     state.v_x, state.v_y = velocity
-
-
-def sample(p: Plant, row: Floats) -> None:
-    """Write the sample at the level that has been reached."""
-    row[:] = p.state.row

@@ -1,15 +1,12 @@
-"""What compiled code works on: records with named fields, what is given to a step, signatures of the plug-ins."""
+"""What compiled code works on: records with named fields, and what is given to a step."""
 
+from collections.abc import Mapping
 from operator import itemgetter
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
-from numba import float64, int64, types, void
-from numpy.typing import NDArray
 
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats, vector
 from brakecli.solver.contact import MOST_KINDS
 
 Pair = tuple[float, float]
@@ -29,9 +26,14 @@ def _attribute(name: str) -> property:
     return property(itemgetter(name), lambda record, value: record.__setitem__(name, value))
 
 
+def one(type_: np.dtype[Any]) -> Any:
+    """An array of one record of zeros."""
+    return np.zeros(1, type_)
+
+
 def new(type_: np.dtype[Any]) -> Any:
     """A record of zeros, with its fields as attributes. Compiled code that gets it writes into it."""
-    return np.zeros(1, type_)[0]
+    return one(type_)[0]
 
 
 STATE = record(
@@ -79,15 +81,12 @@ WORK = record(
 )
 
 COUNTS = record(
-    "side crossing",  # sign of the last sliding velocity; largest contact force (N) as it turned within a step
-    held=int,  # steps that the shoe has stuck for since
     stuck=int,  # level reached by the last step in which it stuck
     level=int,  # level of time that has been reached; of a scheme with steps of its own the sample
     evaluations=int,  # of the contact
     unconverged=int,  # steps whose iteration did not converge
     rising=int,  # steps whose solution need not be unique
     most=int,  # evaluations in one step
-    turns=int,  # steps after which a touching shoe slides the other way, or sticks; not of a scheme's own steps
     kinds=(int, MOST_KINDS),  # steps that each of `contact.kinds()` took
 )
 
@@ -127,7 +126,7 @@ TRACK = record(
     "began",  # time of the last stick's begin, s
     "since",  # latest time of an event that is no longer kept, s
     on=int,  # 1 where the loop notes anything
-    phase=int,  # of the automaton; without contact that of flight
+    phase=int,  # of `motion.phases`; without contact that of flight
     marks=int,  # that have been made
     next=int,  # sample at which the next one is due
     events=int,  # that have been noted
@@ -160,7 +159,7 @@ PAD = record(
     shoe_terms=int,  # harmonics
     wheel_terms=int,
     nodes=int,  # of the midpoint rule; 0 without its tables
-    signals=int,  # where to see that a signal has come, see `compile.stopped`
+    signals=int,  # where to see that a signal has come, see `kernels.stopped`
     gap_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of f2 - f1
     wheel_at=int,  # amplitudes and wavenumbers of the wheel
     full_at=int,  # ∂(k ∫ f2 dξ)/∂(sin) of each of its harmonics, N
@@ -187,10 +186,6 @@ WINDOW = record(
 )
 """The wheel's surface below the pad and ahead of it, see `solver.heights`."""
 
-KNOT = record("time value value_low slope slope_low integral integral_low")
-"""A piecewise linear function of time, at one of its knots (s). Value, slope after it and integral from t = 0 are
-sums of two doubles, to 32 digits."""
-
 
 class Weights(NamedTuple):
     """Step h (s) and weights of a difference scheme; theta_3 is unused by a two-layer scheme."""
@@ -201,118 +196,47 @@ class Weights(NamedTuple):
     theta_3: float
 
 
-class Grid(NamedTuple):
-    """The grid of time, and what bounds the work of a step."""
+COEFFICIENTS = record(*Coefficients._fields)
+"""The constants of (6)-(7), as in `Coefficients`."""
 
-    interval: float  # between samples, s
-    per_sample: int  # steps from one to the next
-    weighted: float  # time at which a scheme takes its forces, see `solver.schemes`
-    lag: int  # levels that its velocity lies behind
-    most: int  # evaluations of one step
-    go_on: int  # 1 where steps that did not converge are counted and do not end the run
-    samples: int  # number of the last sample
-    tolerance: float  # error that a scheme with steps of its own keeps
+WEIGHTS = record(*Weights._fields)
 
-
-class Drive(NamedTuple):
-    """What acts from outside: the speed U of the wheel's surface (m/s) and the load Q (N)."""
-
-    belt: NDArray[Any]
-    load: NDArray[Any]
-
-
-class Layer(NamedTuple):
-    """The springs between shoe and wheel: how their force is computed, and the force found last."""
-
-    evaluate: int  # address of the evaluator
-    press: int  # address of what finds normal force, stiffness and fraction alone, or of the evaluator
-    pad: Any
-    tables: Floats
-    angles: Floats  # phases of the wheel's harmonics, rad
-    scratch: Floats
-    window: Any
-    contact: Any
-
-
-class Plug(NamedTuple):
-    """Addresses of what is plugged into the time loop; of a scheme with its own steps `solve` takes a step."""
-
-    prepare: int
-    finish: int
-    solve: int
-
-
-class Beside(NamedTuple):
-    """A step of a disturbance: the records of a step of the motion."""
-
-    state: Any
-    problem: Any
-    contact: Any
-    work: Any
-
-
-class Plant(NamedTuple):
-    """Everything that the common loop works with: what is given, then the records that it changes."""
-
-    c: Coefficients
-    s: Weights
-    grid: Grid
-    drive: Drive
-    layer: Layer
-    plug: Plug
-    state: Any
-    problem: Any
-    work: Any
-    counts: Any
-    tangent: Any
-    beside: Beside
-    track: Any
-
-
-class Parts(NamedTuple):
-    """What a flow on rough pads works with: what is given, the record that it changes, and tables with scratch.
-
-    It stands here because the cache names the module of each type: loading a kernel may import no other kernels.
-    """
-
-    c: Coefficients
-    f: Any
-    tables: Floats
-
-
-STATE_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE, COUNTS_TYPE, PAD_TYPE, WINDOW_TYPE = (
-    numba.from_dtype(each) for each in (STATE, PROBLEM, CONTACT, WORK, COUNTS, PAD, WINDOW)
+GRID = record(
+    "interval",  # between samples, s
+    "weighted",  # time at which a scheme takes its forces, see `solver.schemes`
+    "tolerance",  # error that a scheme with steps of its own keeps
+    per_sample=int,  # steps from one to the next
+    lag=int,  # levels that its velocity lies behind
+    most=int,  # evaluations of one step
+    go_on=int,  # 1 where steps that did not converge are counted and do not end the run
+    samples=int,  # number of the last sample
+    scheme=int,  # place in `schemes.SCHEMES`
+    iteration=int,  # place in `method.MOST_EVALUATIONS`
 )
-TANGENT_TYPE: Any = numba.from_dtype(TANGENT)
-TRACK_TYPE: Any = numba.from_dtype(TRACK)
-KNOTS = types.Array(numba.from_dtype(KNOT), 1, "C")
-COEFFICIENTS = types.NamedUniTuple(float64, len(Coefficients._fields), Coefficients)
-WEIGHTS = types.NamedUniTuple(float64, len(Weights._fields), Weights)
-GRID = types.NamedTuple([float64, int64, float64, int64, int64, int64, int64, float64], Grid)
-DRIVE = types.NamedUniTuple(KNOTS, len(Drive._fields), Drive)
-LAYER = types.NamedTuple([int64, int64, PAD_TYPE, vector, vector, vector, WINDOW_TYPE, CONTACT_TYPE], Layer)
-BESIDE = types.NamedTuple([STATE_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE], Beside)
-PLUG = types.NamedUniTuple(int64, 3, Plug)
+"""The grid of time, and what bounds the work of a step."""
+
+DRIVE = record(belt_at=int, belt_end=int, load_at=int, load_end=int)
+"""Where in the scratch the knots of the speed U of the wheel's surface and of the load Q begin and end."""
+
+LAYER = record(
+    evaluator=int,  # place in `contact.EVALUATORS`
+    angles_at=int,  # where in the scratch the phases of the wheel's harmonics begin, rad
+    pad=PAD,
+    window=WINDOW,
+    contact=CONTACT,  # the force found last
+)
+"""The springs between shoe and wheel. Their tables are those of the pad; what is found is kept in the scratch."""
+
+BESIDE = record(state=STATE, problem=PROBLEM, contact=CONTACT, work=WORK)
+"""A step of a disturbance: the records of a step of the motion."""
+
+Layer = Any  # a record of LAYER
+Beside = Any  # a record of BESIDE
 
 
-def plant_type(state: np.dtype[Any]) -> Any:
-    """The type of a `Plant` whose scheme keeps its motion in this record."""
-    members = [COEFFICIENTS, WEIGHTS, GRID, DRIVE, LAYER, PLUG, numba.from_dtype(state)]
-    return types.NamedTuple(
-        [*members, PROBLEM_TYPE, WORK_TYPE, COUNTS_TYPE, TANGENT_TYPE, BESIDE, TRACK_TYPE], Plant
-    )
-
-
-PLANT = plant_type(STATE)
-
-EVALUATE = void(float64, float64, LAYER)
-"""evaluate(x, y, layer): fills `layer.contact` for a position of the shoe and the layer's angles of the wheel."""
-
-PREPARE = void(COEFFICIENTS, WEIGHTS, STATE_TYPE, PROBLEM_TYPE)
-"""prepare(c, s, state, problem): sets up the minimisation of one step."""
-
-FINISH = void(COEFFICIENTS, WEIGHTS, STATE_TYPE, PROBLEM_TYPE, CONTACT_TYPE, WORK_TYPE)
-"""finish(c, s, state, problem, contact, work): the new state, and the works added."""
-
-SOLVE = types.UniTuple(int64, 3)(LAYER, PROBLEM_TYPE, int64)
-"""solve(layer, problem, most): solves the step with so many evaluations; (outcome, evaluations, rising points)."""
+def filled(type_: np.dtype[Any], values: Mapping[str, float]) -> Any:
+    """A record of these numbers."""
+    made = new(type_)
+    for name, value in values.items():
+        made[name] = value
+    return made

@@ -6,10 +6,10 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from numba import float64, void
 
-from brakecli.solver.compile import Floats, kernel, vector
+from brakecli.solver.arrays import VECTOR, Floats
 from brakecli.solver.double_double import multiply, split, two_product
+from brakecli.solver.kernels import entry, kernel
 from brakecli.solver.records import LAYER, Layer
 
 PI = Fraction(314159265358979323846264338327950288419716939937511, 10**50)
@@ -85,8 +85,8 @@ def height(f: Surface, xi: Floats) -> Floats:
     return f_xi
 
 
-@kernel(void(vector, float64, float64, vector))
-def wheel_angles(waves: Floats, travel: float, travel_low: float, angles: Floats) -> None:
+@kernel
+def turn_to(waves: Floats, travel: float, travel_low: float, angles: Floats) -> None:
     """Phase in rad of each harmonic at xi = 0 after the wheel has travelled: phase - omega travel, reduced.
 
     `waves` has their phases and the two parts of their turns.
@@ -100,6 +100,10 @@ def wheel_angles(waves: Floats, travel: float, travel_low: float, angles: Floats
         angles[i] = waves[i] - TWO_PI * fraction
 
 
+wheel_angles = entry(None, VECTOR, float, float, VECTOR)(turn_to)
+"""`turn_to`, for Python."""
+
+
 def turned(f: Surface, travel: float, travel_low: float = 0.0) -> Surface:
     """The surface of a wheel that has travelled so far (m, in one number or two), as it then begins at xi = 0."""
     phase = np.zeros(f.g.size)
@@ -107,16 +111,21 @@ def turned(f: Surface, travel: float, travel_low: float = 0.0) -> Surface:
     return f._replace(phase=phase)
 
 
-@kernel(void(float64, float64, LAYER))
-def turn(travel: float, travel_low: float, layer: Layer) -> None:
+@kernel
+def turn(travel: float, travel_low: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """The wheel has travelled so far (m): its phases, or its place on the grid of the window."""
     window = layer.window
     at = layer.pad.turns_at
-    n = layer.angles.size
+    n = layer.pad.wheel_terms
     if window.rows == 0:
-        wheel_angles(layer.tables[at : at + 3 * n], travel, travel_low, layer.angles)
+        angles = scratch[layer.angles_at : layer.angles_at + n]
+        turn_to(tables[at : at + 3 * n], travel, travel_low, angles)
         return
     points = np.floor(travel / window.spacing + 0.5)
     grid, grid_low = two_product(points, window.spacing)
     window.points = points
     window.travel = (travel - grid) + (travel_low - grid_low)
+
+
+turn_wheel = entry(None, float, float, LAYER, VECTOR, VECTOR)(turn)
+"""`turn`, for Python."""

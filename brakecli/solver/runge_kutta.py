@@ -10,10 +10,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import float64, int64, types, void
 
-from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.motions import MOTION_TYPE, POWERS, STAGES
+from brakecli.solver.arrays import Floats
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motions import POWERS, STAGES
 
 END_STAGE = 12
 USED, LAST, TERMS, ORDER = np.array([[12, 6], [16, 13], [7, 4], [8, 5]])
@@ -96,7 +96,7 @@ DENSE[1, 0, [0, 2, 3, 4, 5, END_STAGE]] = (
 """The upper coefficients of the continuous solution."""
 
 
-@kernel(types.UniTuple(float64, 4)(MOTION_TYPE, int64))
+@kernel
 def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
     """Σ A[stage, j] k_j of every component: what the step so far advances by, over the step."""
     x = 0.0
@@ -113,7 +113,7 @@ def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
     return x, y, v_x, v_y
 
 
-@kernel(float64(MOTION_TYPE, int64))
+@kernel
 def local_error(m: Any, component: int) -> float:
     """The error of one component in a step, over the step: of order seven, from those of order three and five.
 
@@ -131,7 +131,7 @@ def local_error(m: Any, component: int) -> float:
     return fifth * fifth / size if size > 0.0 else 0.0
 
 
-@kernel(void(MOTION_TYPE, float64))
+@kernel
 def make_continuous(m: Any, h: float) -> None:
     """Coefficients of the continuous solution, from the slopes and both ends of a step h.
 
@@ -152,7 +152,7 @@ def make_continuous(m: Any, h: float) -> None:
             m.powers[p + 3, i] = h * total
 
 
-@kernel(float64(MOTION_TYPE, int64, float64))
+@kernel
 def interpolated(m: Any, component: int, theta: float) -> float:
     """One component at the part theta of the step that the continuous solution belongs to.
 
@@ -165,7 +165,7 @@ def interpolated(m: Any, component: int, theta: float) -> float:
     return m.begin[component] + total  # type: ignore[no-any-return]
 
 
-@kernel(float64(MOTION_TYPE, int64))
+@kernel
 def reach(m: Any, component: int) -> float:
     """A bound of how far one component of the continuous solution gets from the begin of its step.
 
@@ -179,7 +179,7 @@ def reach(m: Any, component: int) -> float:
     return far  # type: ignore[no-any-return]
 
 
-@kernel(types.UniTuple(float64, 2)(MOTION_TYPE, int64, float64))
+@kernel
 def interpolated_both(m: Any, component: int, theta: float) -> tuple[float, float]:
     """`interpolated`, and its derivative by theta."""
     total = 0.0

@@ -6,18 +6,18 @@ Before the first knot and after the last a schedule holds its value.
 from collections.abc import Sequence
 from fractions import Fraction
 from itertools import chain
-from typing import Any
 
 import numpy as np
-from numba import float64, int64, types
-from numpy.typing import NDArray
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.arrays import Floats
 from brakecli.solver.double_double import add, multiply, split, two_sum
-from brakecli.solver.records import KNOT, KNOTS
+from brakecli.solver.kernels import kernel
 
-Schedule = NDArray[Any]
-"""A piecewise linear function of time: its knots, records of `KNOT`."""
+Schedule = Floats
+"""A piecewise linear function of time: `KNOT` numbers for each of its knots."""
+KNOT = 7
+TIME, VALUE, VALUE_LOW, SLOPE, SLOPE_LOW, INTEGRAL, INTEGRAL_LOW = range(KNOT)
+"""A knot: its time (s); value, slope after it and integral from t = 0 as sums of two doubles, to 32 digits."""
 
 
 def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0) -> Schedule:
@@ -35,40 +35,55 @@ def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0
     at_zero = integrals[k] - (v[k] - (slopes[k] if t[k] <= 0 else 0) * t[k] / 2) * t[k]
     columns = [v, slopes, [integral - at_zero for integral in integrals]]
     pairs = [[split(value) for value in column] for column in columns]
-    return np.array([(float(time), *chain(*rest)) for time, *rest in zip(t, *pairs, strict=True)], KNOT)
+    return np.array([(float(time), *chain(*rest)) for time, *rest in zip(t, *pairs, strict=True)]).ravel()
 
 
-@kernel(int64(KNOTS, float64))
+def knots(s: Schedule) -> int:
+    """How many knots a schedule has; one that is constant has one."""
+    return s.size // KNOT
+
+
+def values(s: Schedule) -> Floats:
+    """The values at its knots."""
+    return s[VALUE::KNOT]
+
+
+def times(s: Schedule) -> Floats:
+    """The times of its knots, s."""
+    return s[TIME::KNOT]
+
+
+@kernel
 def segment(s: Schedule, t: float) -> int:
     """Index of the last knot at or before t, -1 before the first."""
     low = -1
-    high = s.size
+    high = s.size // KNOT
     while high - low > 1:
         middle = (low + high) // 2
-        if s[middle].time <= t:
+        if s[KNOT * middle + TIME] <= t:
             low = middle
         else:
             high = middle
     return low
 
 
-@kernel(float64(KNOTS, float64))
+@kernel
 def value_at(s: Schedule, t: float) -> float:
     """Value at time t (s): v_k + s_k (t - t_k) behind the knot k, with its value and slope."""
     k = segment(s, t)
     if k < 0:
-        return s[0].value  # type: ignore[no-any-return]
-    return s[k].value + s[k].slope * (t - s[k].time)  # type: ignore[no-any-return]
+        return s[VALUE]  # type: ignore[no-any-return]
+    return s[KNOT * k + VALUE] + s[KNOT * k + SLOPE] * (t - s[KNOT * k + TIME])  # type: ignore[no-any-return]
 
 
-@kernel(float64(KNOTS, float64))
+@kernel
 def slope_at(s: Schedule, t: float) -> float:
     """Time derivative just after time t."""
     k = segment(s, t)
-    return s[k].slope if k >= 0 else 0.0
+    return s[KNOT * k + SLOPE] if k >= 0 else 0.0
 
 
-@kernel(types.UniTuple(float64, 2)(KNOTS, float64, float64))
+@kernel
 def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
     """Integral from 0 to t + t_low, as a sum of two doubles; t_low may be of any size, beyond a knot as well.
 
@@ -76,14 +91,14 @@ def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
     """
     t, t_low = two_sum(t, t_low)
     k = max(segment(s, t), 0)
-    slope = s[k].slope
-    slope_low = s[k].slope_low
-    if t < s[0].time:
+    slope = s[KNOT * k + SLOPE]
+    slope_low = s[KNOT * k + SLOPE_LOW]
+    if t < s[TIME]:
         slope = 0.0
         slope_low = 0.0
-    after, after_low = two_sum(t, -s[k].time)
+    after, after_low = two_sum(t, -s[KNOT * k + TIME])
     after, after_low = add(after, after_low, t_low, 0.0)
     mean, mean_low = multiply(after, after_low, 0.5 * slope, 0.5 * slope_low)
-    mean, mean_low = add(mean, mean_low, s[k].value, s[k].value_low)
+    mean, mean_low = add(mean, mean_low, s[KNOT * k + VALUE], s[KNOT * k + VALUE_LOW])
     part, part_low = multiply(after, after_low, mean, mean_low)
-    return add(part, part_low, s[k].integral, s[k].integral_low)
+    return add(part, part_low, s[KNOT * k + INTEGRAL], s[KNOT * k + INTEGRAL_LOW])

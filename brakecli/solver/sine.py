@@ -4,9 +4,8 @@ The polynomials are those of fdlibm (Sun Microsystems, 1993), right to a unit in
 """
 
 import numpy as np
-from numba import float64, types
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.kernels import kernel
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: a sum with it is rounded to a whole number
 _QUARTERS = 0.6366197723675814  # 2/pi
@@ -15,7 +14,7 @@ _QUARTER = 1.57079632673412561417
 _QUARTER_LOW = 6.07710050650619224932e-11
 
 
-@kernel(types.UniTuple(float64, 2)(float64))
+@kernel
 def sine_cosine(psi: float) -> tuple[float, float]:
     """(sin psi, cos psi), within 2e-16 of the library's; beyond 1e5 within the rounding of psi.
 

@@ -7,13 +7,14 @@ from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
-from numba import float64, void
 
 from brakecli.errors import CaseError, Problem
-from brakecli.solver.compile import Floats, at_address, borrowed, kernel, vector
+from brakecli.solver.arrays import VECTOR, Floats
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
+from brakecli.solver.contact.force import evaluate
 from brakecli.solver.contact.pad import build_layer
-from brakecli.solver.records import EVALUATE, LAYER, Layer
+from brakecli.solver.kernels import entry
+from brakecli.solver.records import LAYER, Layer
 from brakecli.solver.roughness import turn
 from brakecli.solver.system import System
 
@@ -32,8 +33,6 @@ are a million times as large, and a small change of any of them lifts the shoe o
 UNPRESSED = (
     "there is no steady sliding: nothing presses the shoe on the wheel; change the load, or the angle of link 1"
 )
-
-_evaluate_at = at_address(EVALUATE)
 
 Mean = Callable[[float], tuple[float, float, float]]
 """Mean force (N), stiffness (N/m) and touching part of the contact at a height y (m)."""
@@ -54,26 +53,28 @@ class SteadySliding:
         return self.normal_force > PRESSED * abs(load)
 
 
-@kernel(void(float64, vector, vector, LAYER, vector))
-def add_places(y: float, places: Floats, weights: Floats, layer: Layer, sums: Floats) -> None:
+@entry(None, float, VECTOR, VECTOR, LAYER, VECTOR, VECTOR, VECTOR)
+def add_places(
+    y: float, places: Floats, weights: Floats, layer: Layer, tables: Floats, scratch: Floats, sums: Floats
+) -> None:
     """Add force, stiffness and touching part at places of the wheel, Σ w_i F(x_i), with their weights."""
-    layer = borrowed(layer)
     contact = layer.contact
     for i in range(places.size):
-        turn(places[i], 0.0, layer)
-        _evaluate_at(layer.evaluate)(0.0, y, layer)
+        turn(places[i], 0.0, layer, tables, scratch)
+        evaluate(0.0, y, layer, tables, scratch)
         sums[0] += weights[i] * contact.normal_force
         sums[1] += weights[i] * contact.stiffness
         sums[2] += weights[i] * contact.fraction
 
 
-@kernel(void(vector, vector, LAYER, vector))
-def forces_along(heights: Floats, places: Floats, layer: Layer, forces: Floats) -> None:
+@entry(None, VECTOR, VECTOR, LAYER, VECTOR, VECTOR, VECTOR)
+def forces_along(
+    heights: Floats, places: Floats, layer: Layer, tables: Floats, scratch: Floats, forces: Floats
+) -> None:
     """The normal force (N) at each height (m) and place of the wheel (m)."""
-    layer = borrowed(layer)
     for i in range(places.size):
-        turn(places[i], 0.0, layer)
-        _evaluate_at(layer.evaluate)(0.0, heights[i], layer)
+        turn(places[i], 0.0, layer, tables, scratch)
+        evaluate(0.0, heights[i], layer, tables, scratch)
         forces[i] = layer.contact.normal_force
 
 
@@ -104,16 +105,16 @@ def mean_contacts(system: System, y: float) -> Floats:
     if covered == FULL:
         return np.tile([-pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0], (WINDOWS, 1))
     found = np.zeros((WINDOWS, 3))
-    layer = build_layer(system.evaluate, system.pad, moving=fills_window(system))
+    layer = build_layer(system.evaluator, system.pad, moving=fills_window(system))
     if wheel.g.size == 0:
-        add_places(y, np.zeros(1), np.ones(1), layer, found[0])
+        add_places(y, np.zeros(1), np.ones(1), *layer, found[0])
         return np.tile(found[0], (WINDOWS, 1))
     window = averaged_length(system) / WINDOWS
     each = PLACES // WINDOWS
     for k in range(WINDOWS):
         parts = (np.arange(each) + (k + 0.5) / WINDOWS) / each
         weights = 2.0 * np.sin(np.pi * parts) ** 2
-        add_places(y, window * (parts + k - WINDOWS // 2), weights / each, layer, found[k])
+        add_places(y, window * (parts + k - WINDOWS // 2), weights / each, *layer, found[k])
     return found
 
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST_EVALUATIONS, Method
-from brakecli.solver.records import Grid, Weights
+from brakecli.solver.records import Weights
 from brakecli.solver.roughness import Surface
-from brakecli.solver.schedules import Schedule, value_at
+from brakecli.solver.schedules import Schedule, knots, value_at, values
 
 MOST_STEPS = 1e11
 MOST_TABLE_BYTES = 4e9
@@ -135,14 +135,9 @@ class System:
             return 0
         return self.method.nodes or default_nodes(self.half_length, self.shoe, self.wheel)
 
-    @cached_property
-    def evaluate(self) -> Any:
-        """The kernel of the contact evaluator."""
-        return contact.load(self.evaluator)
-
     @property
     def scheme(self) -> schemes.SchemeModule:
-        """The scheme's module; its kernels are compiled on the first call of a new version."""
+        """The scheme's module, whose loop is loaded."""
         return schemes.load(self.method.scheme)
 
     @property
@@ -153,7 +148,7 @@ class System:
     @property
     def steady(self) -> bool:
         """Whether speed and load are constant."""
-        return len(self.belt) == len(self.load) == 1
+        return knots(self.belt) == knots(self.load) == 1
 
     @property
     def contact_stiffness(self) -> float:
@@ -168,7 +163,7 @@ class System:
     @property
     def fastest_belt(self) -> float:
         """The largest |U|, m/s."""
-        return float(max(map(abs, self.belt["value"].tolist())))
+        return float(np.abs(values(self.belt)).max())
 
     @property
     def load_at_start(self) -> float:
@@ -239,20 +234,22 @@ class System:
         return Weights(self.step, theta_1, theta_2, theta_3)
 
     @property
-    def grid(self) -> Grid:
-        """The grid of time as the loop sees it."""
+    def grid(self) -> dict[str, float]:
+        """The grid of time as the loop sees it, by the names of `records.GRID`."""
         method = self.method
         scheme = self.scheme
-        return Grid(
-            self.interval,
-            self.per_sample,
-            scheme.weighted_time(self.weights),
-            scheme.LAG,
-            MOST_EVALUATIONS[method.iteration],
-            int(method.allow_unconverged),
-            self.samples,
-            method.tolerance,
-        )
+        return {
+            "interval": self.interval,
+            "weighted": scheme.weighted_time(self.weights),
+            "tolerance": method.tolerance,
+            "per_sample": self.per_sample,
+            "lag": scheme.LAG,
+            "most": MOST_EVALUATIONS[method.iteration],
+            "go_on": int(method.allow_unconverged),
+            "samples": self.samples,
+            "scheme": list(schemes.SCHEMES).index(method.scheme),
+            "iteration": list(MOST_EVALUATIONS).index(method.iteration),
+        }
 
 
 def _at_least(ratio: float) -> int:

@@ -16,12 +16,12 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import float64, int64, void
 
 from brakecli.solver.alike import by_rows
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats, kernel
-from brakecli.solver.records import BESIDE, COEFFICIENTS, PARTS, PROBLEM_TYPE, TANGENT_TYPE, Beside
+from brakecli.solver.kernels import kernel
+from brakecli.solver.records import PARTS, Beside
 
 BATCHES = 8
 """Batches of the parts of the second half of a run; of twice as many parts each, half as many."""
@@ -94,7 +94,7 @@ def exponent(t: Any, duration: float, h: float, lag: int) -> Exponent:
     return found._replace(error=math.hypot(found.error, placed * t.rate * h * t.placed / duration))
 
 
-@kernel(float64(float64, float64))
+@kernel
 def kept(needed: float, bound: float) -> float:
     """The part of a disturbance of the sliding velocity that is left as the shoe comes to the wheel's velocity.
 
@@ -104,7 +104,7 @@ def kept(needed: float, bound: float) -> float:
     return max(abs(needed) - bound, 0.0) / (abs(needed) + bound) if bound > 0.0 else 1.0
 
 
-@kernel(void(BESIDE, float64, float64, float64, int64))
+@kernel
 def meet(beside: Beside, part: float, theta: float, h: float, lag: int) -> None:
     """Keep a part of the disturbed velocity from an event on, which lies at the part theta of a step h.
 
@@ -121,7 +121,7 @@ def meet(beside: Beside, part: float, theta: float, h: float, lag: int) -> None:
         b.v_x *= part
 
 
-@kernel(void(COEFFICIENTS, BESIDE, PROBLEM_TYPE, float64, float64, float64))
+@kernel
 def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: float, tangential: float) -> None:
     """The minimisation of a step, differentiated: velocities and normal force of the disturbance.
 
@@ -152,7 +152,7 @@ def solve(c: Coefficients, beside: Beside, of: Any, side: float, stiffness: floa
     b.normal_force = force
 
 
-@kernel(float64(TANGENT_TYPE, int64, int64))
+@kernel
 def renew(t: Any, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by.
 

@@ -16,14 +16,14 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver import automaton
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats, kernel
 from brakecli.solver.energy import Mechanical
-from brakecli.solver.records import MOST_EVENTS, PARTS, TRACK_TYPE, WORK_TYPE, Weights
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion import phases
+from brakecli.solver.records import MOST_EVENTS, PARTS, Weights
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH, TURN = range(7)
 """Kinds of events: turning points of x, begin and end of a stick, end and begin of contact, and sliding that turns
@@ -133,7 +133,7 @@ UNTRACKED = Track(
 def follow(t: Any, v_x: float) -> None:
     """Note all from the start on, with the velocity there (m/s)."""
     t.on = 1
-    t.phase = automaton.UNDECIDED
+    t.phase = phases.UNDECIDED
     t.way = np.sign(v_x)
     t.since = -math.inf
 
@@ -153,9 +153,9 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
     return Track(t.times[: t.marks].copy(), works, stored, x, t.counts.copy(), float(t.since), kept)
 
 
-@kernel(types.Array(float64, 1, "C")(TRACK_TYPE, WORK_TYPE, int64, int64, float64, float64), inlined=False)
-def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float) -> Floats:
-    """Make a mark at a sample, and say when the next one is due; the row that gets the state there."""
+@kernel(inline=False)
+def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float) -> int:
+    """Make a mark at a sample, and say when the next one is due; the row of `states` that gets the state there."""
     at = t.marks
     parts = min(PARTS, samples)
     t.times[at] = time
@@ -169,10 +169,10 @@ def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float
     t.states[at, 6] = store
     t.marks = at + 1
     t.next = ((number * parts // samples + 1) * samples + parts - 1) // parts
-    return t.states[at]  # type: ignore[no-any-return]
+    return at  # type: ignore[no-any-return]
 
 
-@kernel(void(TRACK_TYPE, int64, float64, float64), inlined=False)
+@kernel(inline=False)
 def put(t: Any, kind: int, time: float, x: float) -> None:
     """Note an event; the last ones are kept."""
     at = t.events % MOST_EVENTS
@@ -185,21 +185,21 @@ def put(t: Any, kind: int, time: float, x: float) -> None:
     t.counts[kind] += 1
 
 
-@kernel(void(TRACK_TYPE, int64, *[float64] * 5), inlined=False)
+@kernel(inline=False)
 def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """Note the events with which a phase begins, and the motion there; the first one begins without any."""
     was = t.phase
     t.phase = phase
     before = t.events
-    if was == automaton.UNDECIDED or was == phase:
+    if was == phases.UNDECIDED or was == phase:
         return
-    if was == automaton.STICK:
+    if was == phases.STICK:
         put(t, SLIP, time, x)
-    if phase == automaton.OPEN:
+    if phase == phases.OPEN:
         put(t, LIFT, time, x)
-    elif was == automaton.OPEN:
+    elif was == phases.OPEN:
         put(t, TOUCH, time, x)
-    if phase == automaton.STICK:
+    if phase == phases.STICK:
         put(t, STICK, time, x)
     if t.events == before:  # from one side to the other
         put(t, TURN, time, x)
@@ -210,7 +210,7 @@ def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: 
         others[2] = v_y
 
 
-@kernel(int64(TRACK_TYPE, float64))
+@kernel
 def turned(t: Any, v_x: float) -> int:
     """The kind of a turning point that a velocity (m/s) on the other side of zero tells of; -1 if it does not."""
     kind = -1

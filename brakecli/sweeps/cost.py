@@ -125,7 +125,7 @@ def _noted(plan: Plan, point: int, failing: list[str]) -> Iterator[None]:
 
 def _forced_seconds(plan: Plan, settings: Settings, critical: Critical) -> float:
     """The time (s) of a search along what a rough wheel forces; 0 where it forces nothing."""
-    from brakecli.solver.flow.rough import default_steps  # only searches wait for its kernels
+    from brakecli.solver.motion.rough import default_steps  # only searches wait for its kernels
     from brakecli.sweeps.lyapunov import exponent_length
 
     seconds = 0.0

@@ -20,7 +20,7 @@ from brakecli.files.os_signals import lastly
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.solver.beforehand import cores
-from brakecli.solver.motion import Counted
+from brakecli.solver.integrate import Counted
 from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan

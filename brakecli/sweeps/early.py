@@ -1,6 +1,6 @@
 """A verdict as soon as it is known, on smooth pads at constant speed and load: what a sweep needs of a point.
 
-The motion is followed without samples (`solver.flow.seek`) until one of two things is
+The motion is followed without samples (`solver.motion.orbit`) until one of two things is
 certain.
 
 - It slides to one side, and the sum of its modes can neither reach the speed of the wheel nor open the contact
@@ -13,7 +13,7 @@ stick, a settled part that is too short), there is no early verdict, and the run
 """
 
 import math
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -26,13 +26,13 @@ from brakecli.analysis.stability.linear import Linear, Theory, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.runs.settled import Judged
-from brakecli.solver.automaton import STICK
-from brakecli.solver.compile import Floats
-from brakecli.solver.motion import Work
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import Work
+from brakecli.solver.motion.advance import DONE
+from brakecli.solver.motion.flow import Pursuit, SmoothFlow
+from brakecli.solver.motion.orbit import FOUND, GOING_ON, LINEAR
+from brakecli.solver.motion.phases import STICK
 from brakecli.solver.system import System
-
-if TYPE_CHECKING:
-    from brakecli.solver.flow.seek import Pursuit
 
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
 _POWERS = 10.0  # of e, by which what is left then fades until the end: drift is seen no more
@@ -56,9 +56,6 @@ def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None
     known = _theory(system, theory)
     if known is None:
         return None
-    # Rough pads do not wait for these kernels.
-    from brakecli.solver.flow.seek import FOUND, GOING_ON, LINEAR, Pursuit
-
     acting = system.contact_stiffness, system.belt_speed, system.load_at_start
     modes = known.values, known.vectors
     try:
@@ -69,7 +66,6 @@ def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None
         return None
     while (outcome := motion.seek()) == GOING_ON:
         pass
-    path = motion.path
     o = motion.way
     if outcome == LINEAR:
         found = _linear(system, known, motion)
@@ -78,7 +74,7 @@ def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None
     if found is None:
         return None
     verdict, end = found
-    work = Work(steps=int(path.steps), contact_evaluations=int(path.evaluations))
+    work = Work(steps=motion.steps, contact_evaluations=motion.evaluations)
     error = max(float(o.error), ROUNDING) if outcome == FOUND else ROUNDING  # not that of an orbit given up
     certificate = Certificate(system.method.tolerance, True, error, system.sampled_duration, "the orbit itself")
     row = np.array([end])
@@ -98,12 +94,13 @@ def _theory(system: System, theory: Theory | None) -> Linear | None:
     return found if found is not None and found.direction != 0 else None
 
 
-def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
+def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
     """The verdict on a motion that is linear from its first half on, and its last state."""
     o = motion.way
     start = (system.samples + 1) // 2 * system.interval
     end = system.sampled_duration
-    if o.time > start:
+    reached = motion.time
+    if reached > start:
         return None
     rest = np.array(o.rest)
     values = theory.values
@@ -111,7 +108,7 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
     parts = np.linalg.solve(vectors, motion.state - rest)
 
     def at(time: float) -> Floats:
-        return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - o.time)))).real)
+        return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - reached)))).real)
 
     last = at(end)
 
@@ -123,7 +120,7 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         motion.swing(at(begin), until - begin)
         return 0.5 * float(o.high - o.low)
 
-    fades = np.exp(values * (end - o.time)) - np.exp(values * (start - o.time))
+    fades = np.exp(values * (end - reached)) - np.exp(values * (start - reached))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = system.coefficients.grip(theory.belt) * -system.contact_stiffness * float(height)
     answers = Answers(duration=end, linear=True, growth=theory.mode.growth, ringing=theory.mode.frequency)
@@ -139,21 +136,19 @@ def _linear(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict,
         "settled_from": start,
         "settled": False,
         "evidence": evidence,
-        "left": math.exp(theory.mode.growth * (end - o.time)),
+        "left": math.exp(theory.mode.growth * (end - reached)),
     }
     if decision.regime is not Regime.DAMPED:
         return Verdict(decision, amplitude(start, end), **numbers), last.tolist()
     first, late = (place * system.interval for place in tenths(system.samples + 1))
     first -= system.interval  # its last sample
-    before = _swung(system, theory, min(o.time, first))
-    early = amplitude(o.time, first, *before) if o.time < first else 0.5 * (before[1] - before[0])
+    before = _swung(system, theory, min(reached, first))
+    early = amplitude(reached, first, *before) if reached < first else 0.5 * (before[1] - before[0])
     return Verdict(decision, amplitude(late, end), amplitude_first=early, **numbers), last.tolist()
 
 
 def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float]:
     """The least and the largest x (m) in the first seconds of a motion."""
-    from brakecli.solver.flow.smooth import DONE, SmoothFlow
-
     flow = SmoothFlow.of(system)
     state = system.initial.beside(theory.rest)
     least = math.inf
@@ -169,7 +164,7 @@ def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float
         seconds = seconds - float(flow.path.time)
 
 
-def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, list[float]] | None:
+def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
     o = motion.way
     orbit = motion.orbit
@@ -184,19 +179,18 @@ def _cycle(system: System, theory: Linear, motion: "Pursuit") -> tuple[Verdict, 
     part = end - start
     stick = orbit.stick_fraction * period
     clear = orbit.contact_loss_fraction * period
-    limited = period - float(o.spent[o.sliding])
+    limited = period - float(motion.path.spent[o.sliding])
     hidden = (
         part < _SETTLED_PART * end
         or end < _CYCLES * WINDOWS * period
         or period < _SAMPLES * interval
         or min(limited, stick or limited, clear or limited) < _SEEN * interval
-        or (stick == 0.0 and abs(float(o.fastest) - 1.0) < _GRAZES)
-        or o.beaten.tolist() != [1, 1]
+        or (stick == 0.0 and abs(motion.fastest - 1.0) < _GRAZES)
+        or motion.path.beaten.tolist() != [1, 1]
     )
     if rate * part < _POWERS or hidden:
         return None
-    c = system.coefficients
-    force = (c.c_xx * float(o.mean_x) + c.c_xy * float(o.mean_y)) / period + system.load_at_start * c.sin_beta
+    force = float(o.force)
     answers = Answers(
         duration=end,
         growth=theory.mode.growth,

@@ -23,7 +23,7 @@ from brakecli.files.field import Field, labelled, values_of
 from brakecli.files.fields import TEXT
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
-from brakecli.solver.motion import Counted
+from brakecli.solver.integrate import Counted
 from brakecli.solver.system import System
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.result import unit

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from brakecli.analysis.stability.search import bisect
-from brakecli.solver.compile import Floats
-from brakecli.solver.flow.rough import RoughFlow, Status, default_cells, default_steps
+from brakecli.solver.arrays import Floats
+from brakecli.solver.motion.rough import RoughFlow, Status, default_cells, default_steps
 from brakecli.solver.period import LONGEST
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.solver.system import System

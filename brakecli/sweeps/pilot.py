@@ -18,8 +18,8 @@ from brakecli.runs.limits import Check, within_range
 from brakecli.runs.price import measured
 from brakecli.runs.settled import Judged
 from brakecli.runs.together import TOGETHER, certify_together, loops
+from brakecli.solver.integrate import Motion
 from brakecli.solver.lanes.records import LANES
-from brakecli.solver.motion import Motion
 from brakecli.solver.system import MOST_STEPS
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.plan import Plan

@@ -17,7 +17,7 @@ from brakecli.files.field import values_of
 from brakecli.runs.limits import Check, within_range
 from brakecli.runs.settled import Judged
 from brakecli.runs.together import TOGETHER, certify_together
-from brakecli.solver.motion import Motion
+from brakecli.solver.integrate import Motion
 from brakecli.solver.roughness import TWO_PI, turned
 from brakecli.solver.schedules import integral_at
 from brakecli.sweeps.plan import Plan, Settings

@@ -19,7 +19,7 @@ from brakecli.runs.limits import Check, check, refuse, within_range
 from brakecli.runs.settled import Judged, settled
 from brakecli.solver.alike import at_once
 from brakecli.solver.history import array_history
-from brakecli.solver.motion import Motion
+from brakecli.solver.integrate import Motion
 from brakecli.solver.system import System
 from brakecli.sweeps.early import Ending, early
 from brakecli.sweeps.record import Status

@@ -14,7 +14,7 @@ import tomli_w
 
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import HISTORY
 from tests.analysis.shoes import Array, Shoe, Tables
 

@@ -15,7 +15,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.runs.judge import asked, verdict_in_memory
 from brakecli.solver.history import History, array_history
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Events, Track
 

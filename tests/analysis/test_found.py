@@ -14,7 +14,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
 from brakecli.runs import judge
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of

@@ -8,6 +8,7 @@ import numpy as np
 
 from brakecli.analysis.stability.linear import Linear, linear_theory, theories_of
 from brakecli.case.system import system_of
+from brakecli.solver.schedules import values
 from brakecli.solver.system import System
 from tests.examples import ROUGH, SQUEAL, make
 
@@ -22,7 +23,7 @@ def shoes() -> list[System]:
     cases += [make(SQUEAL | {"roughness": {"wheel": two}}, **bare), make(SQUEAL, **bare), make(SQUEAL)]
     cases += [make(SQUEAL, wheel__angular_speed=each) for each in (0.0, -3.0)]
     lifted = replace(system_of(make(SQUEAL)), load=system_of(make(SQUEAL)).load.copy())
-    lifted.load["value"] *= -1.0
+    values(lifted.load)[:] *= -1.0
     return [*map(system_of, cases), lifted, modes_that_meet()]
 
 

@@ -13,7 +13,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.runs.judge import asked, in_memory
 from brakecli.solver.history import stacked
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from tests.analysis.histories import history_of
 from tests.examples import ROUGH, SQUEAL, make
 

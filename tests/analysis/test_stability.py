@@ -354,10 +354,10 @@ def test_a_mean_over_waves_has_a_bar_that_holds_a_finer_one() -> None:
     assert report.critical_error is not None
     assert 1e-4 < report.critical_error < 1e-2
     y = report.equilibrium.y
-    layer = build_layer(system.evaluate, system.pad)
+    layer = build_layer(system.evaluator, system.pad)
     parts = (np.arange(16 * PLACES) + 0.5) / (16 * PLACES)
     sums = np.zeros(3)
-    add_places(y, 16.0 * averaged_length(system) * parts, 2.0 * np.sin(np.pi * parts) ** 2, layer, sums)
+    add_places(y, 16.0 * averaged_length(system) * parts, 2.0 * np.sin(np.pi * parts) ** 2, *layer, sums)
     finer = float(sums[1]) / len(parts)
     assert abs(report.contact_stiffness - finer) < report.contact_stiffness_error < 2e-3 * finer
     full = stability(system_of(make({**OPEN, "load": {"force": 1e5}})))

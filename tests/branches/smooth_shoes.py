@@ -15,7 +15,7 @@ from brakecli.branches.line import Line
 from brakecli.branches.newton import Newton, Settings
 from brakecli.branches.point import Branch, Point
 from brakecli.branches.sliding import Change, Sliding
-from brakecli.solver.flow.repeating import Orbit
+from brakecli.solver.motion.flow import Orbit
 from tests.analysis.shoes import Array, Shoe, Tables, random_shoes
 from tests.branches.phasewise import Phasewise
 from tests.examples import make

@@ -22,7 +22,7 @@ from brakecli.branches.sliding import Sliding
 from brakecli.branches.switch import switch
 from brakecli.case.case import Case
 from brakecli.errors import CaseError
-from brakecli.solver.automaton import BACKWARD, FORWARD, STICK
+from brakecli.solver.motion.phases import BACKWARD, FORWARD, STICK
 from brakecli.solver.system import System
 from brakecli.sweeps.critical import search
 from brakecli.sweeps.tables import Critical

@@ -95,7 +95,7 @@ def test_a_result_with_another_header_is_refused_with_a_sentence_or_used(
     for _ in range(number):
         (tmp_path / "f.h5").write_bytes(with_another_header(whole, chance))
         words = chance.choice((["classify"], ["classify", "--json"], ["run", "-o", "o.h5", "--force", "-q"]))
-        done = forked(words[0], "f.h5", *words[1:], cwd=tmp_path, memory=415_000_000)
+        done = forked(words[0], "f.h5", *words[1:], cwd=tmp_path, memory=515_000_000)
         assert done.code in (0, 1, 4), done
         assert done.code == 0 or done.err.count("has no digest") + 1 == done.err.count("\n"), done
         assert not odd_in(done.err), done

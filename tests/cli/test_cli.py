@@ -329,12 +329,20 @@ def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> Non
     assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
 
 
+def test_a_run_that_keeps_a_tolerance_tells_the_step_that_it_took(tmp_path: Path) -> None:
+    """So many steps of that length are the duration; the case gives none."""
+    case = TINY.replace("{ step = 1e-5, duration", '{ scheme = "two-layer", tolerance = 1e-4, duration')
+    done = brakecli("run", "-", cwd=tmp_path, stdin=case)
+    found = re.search(r"steps +(\d+) of (\S+) s,", done.out)
+    assert found is not None, done
+    assert int(found[1]) * float(found[2]) == pytest.approx(0.02, rel=1e-3)
+
+
 def test_vibration_on_smooth_pads_waits_for_no_kernels_of_rough_ones(tmp_path: Path) -> None:
     """Whether it lasts is asked of the flow on smooth pads."""
     loaded = loaded_by(["run", str(ROOT / "cases" / "relaxation.toml"), "--output", "r.h5"], tmp_path)
-    assert "brakecli.solver.flow.seek" in loaded
-    unused = {f"brakecli.solver.{name}" for name in ("flow.rough", "schemes.event_driven", "contact.midpoint")}
-    assert loaded.isdisjoint(unused)
+    assert "brakecli.solver.motion.orbit" in loaded
+    assert loaded.isdisjoint({"brakecli.solver.motion.rough", "brakecli.solver.schemes.event_driven"})
 
 
 @campaign
@@ -344,8 +352,8 @@ def test_a_sweep_without_a_search_waits_for_no_kernels_of_branches(tmp_path: Pat
     (tmp_path / "sweep.toml").write_text(f'case = "tiny.toml"\n{axis}')
     loaded = loaded_by(["sweep", "sweep.toml"], tmp_path)
     assert {"brakecli.sweeps.point", "brakecli.solver.loop"} <= loaded
-    flows = {f"brakecli.solver.flow.{name}" for name in ("smooth", "rough", "orbit", "seek")}
-    assert loaded.isdisjoint({*flows, "brakecli.solver.schemes.event_driven", "brakecli.branches.explore"})
+    others = "solver.motion.rough", "solver.schemes.event_driven", "branches.explore"
+    assert loaded.isdisjoint(f"brakecli.{name}" for name in others)
 
 
 def test_a_measured_signal_waits_for_no_compiled_code(tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ import pytest
 from brakecli.case.system import system_of
 from brakecli.files.atomic import new_output
 from brakecli.files.os_signals import lastly
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from brakecli.stop import signals_shown
 from brakecli.sweeps.workers.local import CallerEngine
 from brakecli.sweeps.workers.task import Task

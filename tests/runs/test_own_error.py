@@ -17,7 +17,7 @@ from brakecli.case.system import system_of
 from brakecli.front.inputs import load_case
 from brakecli.runs import own_error
 from brakecli.runs.own_error import SAFETY, Known, by_own_error, last_of
-from brakecli.solver.motion import Motion, solve
+from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
 from tests.campaign import campaign, counts

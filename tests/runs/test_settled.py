@@ -23,7 +23,7 @@ from brakecli.runs.advise import advise
 from brakecli.runs.judge import asked, motion_of, verdict_in_memory
 from brakecli.runs.limits import check
 from brakecli.runs.settled import MOST_SAMPLES, Judged, Settled, longest, settled
-from brakecli.solver.motion import Motion
+from brakecli.solver.integrate import Motion
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
 from brakecli.sweeps.plan import parse_sweep

@@ -13,7 +13,7 @@ from brakecli.branches.begin import on_smooth_pads
 from brakecli.branches.line import Shoe
 from brakecli.case.system import system_of
 from brakecli.runs.without_waves import LONGEST, without_waves
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from tests.examples import SQUEAL, make

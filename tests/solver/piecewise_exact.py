@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
+from brakecli.solver.schedules import values
 from brakecli.solver.system import System
 
 Vector = NDArray[np.float64]
@@ -21,7 +22,7 @@ class PiecewiseExact:
 
     def __init__(self, system: System, grid: float) -> None:
         c = system.coefficients
-        q = float(system.load["value"][0])
+        q = float(values(system.load)[0])
         self.belt = system.belt_speed
         self.phi = c.phi
         self.stiffness = system.contact_stiffness

@@ -14,13 +14,13 @@ from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from brakecli.solver import contact
-from brakecli.solver.contact.pad import Pad, build_layer, build_pad
-from brakecli.solver.records import Layer
+from brakecli.solver.contact import EVALUATORS as ROWS
+from brakecli.solver.contact.force import fill
+from brakecli.solver.contact.pad import ContactLayer, Pad, build_layer, build_pad
 from brakecli.solver.roughness import Surface, surface, wheel_angles
 
 EPS = 2.0**-52
-EVALUATORS = tuple(contact.EVALUATORS)
+EVALUATORS = tuple(ROWS)
 
 
 class Wave(NamedTuple):
@@ -168,14 +168,14 @@ class Gap:
         """What the package computes with the shoe moved by (dx, dy): a record of CONTACT."""
         layer = unfilled(evaluator, self.pad(nodes) if pad is None else pad)
         layer.angles[:] = self.angles
-        contact.load(evaluator)(self.x + dx, self.y + dy, layer)
+        fill(self.x + dx, self.y + dy, *layer)
         return layer.contact
 
 
-def unfilled(evaluator: str, pad: Pad) -> Layer:
+def unfilled(evaluator: str, pad: Pad) -> ContactLayer:
     """The package's layer with nothing in it that an evaluator might take for a result."""
-    layer = build_layer(contact.load(evaluator), pad)
-    layer.scratch[:] = np.nan
+    layer = build_layer(evaluator, pad)
+    layer.scratch[: int(layer.layer.angles_at)] = np.nan
     for name in layer.contact.dtype.names:
         if name != "reach":  # which is given
             layer.contact[name] = -1 if name in ("kind", "valid") else np.nan

@@ -1,14 +1,15 @@
 """A small evaluator for the test of the registry: smooth surfaces, the layer as one spring."""
 
-from brakecli.solver.compile import kernel
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import kinds
-from brakecli.solver.records import EVALUATE, Layer
+from brakecli.solver.kernels import kernel
+from brakecli.solver.records import Layer
 
 KIND = kinds().index("spring")  # a file is imported when its row is there
 
 
-@kernel(EVALUATE)
-def evaluate(x: float, y: float, layer: Layer) -> None:
+@kernel
+def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     pad = layer.pad
     contact = layer.contact
     touching = 1.0 if y < 0.0 else 0.0

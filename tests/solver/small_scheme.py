@@ -2,16 +2,14 @@
 
 from typing import Any
 
-from brakecli.solver import loop, records
+from brakecli.solver import records
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import kernel
 from brakecli.solver.energy import energy_at_level
+from brakecli.solver.kernels import kernel
 from brakecli.solver.records import Pair, Weights
 
 STATE = records.STATE
-hold = loop.hold
-advance = loop.advance
-sample = loop.sample
+KEPT = "state"
 LAG = 0
 MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
 VELOCITIES: tuple[str, ...] = ("v_x", "v_y")
@@ -31,7 +29,7 @@ def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: 
     state.v_x, state.v_y = velocity
 
 
-@kernel(records.PREPARE)
+@kernel
 def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
     h = s.h
     inertia = c.m / s.h
@@ -50,7 +48,7 @@ def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
     problem.normal_force = state.force
 
 
-@kernel(records.FINISH)
+@kernel
 def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
     p = problem.d
     q = problem.e

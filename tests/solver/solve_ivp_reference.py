@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from brakecli.solver import contact
+from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer
+from brakecli.solver.schedules import values
 from brakecli.solver.system import System
 
 Vector = NDArray[np.float64]
@@ -28,9 +29,8 @@ class SolveIvp:
         self.max_step = max_step
         self.c = system.coefficients
         self.belt = system.belt_speed
-        self.q = float(system.load["value"][0])
-        self.evaluate = contact.load("exact")
-        self.layer = build_layer(self.evaluate, system.pad)
+        self.q = float(values(system.load)[0])
+        self.layer = build_layer("exact", system.pad)
         self.visited: list[int] = []
         self.evaluations = 0
 
@@ -39,7 +39,7 @@ class SolveIvp:
         self.evaluations += 1
         wheel = self.system.wheel
         self.layer.angles[:] = wheel.phase - wheel.omega * (self.belt * t)
-        self.evaluate(z[0], z[1], self.layer)
+        fill(z[0], z[1], *self.layer)
         return float(self.layer.contact.normal_force)
 
     def against(self, z: Vector) -> tuple[float, float]:

@@ -4,10 +4,10 @@ import fcntl
 import json
 import os
 import resource
-import shutil
 import signal
 import subprocess
 import sys
+import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -17,6 +17,7 @@ from typing import Any
 import pytest
 
 from brakecli.solver import beforehand, compiling
+from brakecli.solver.cache_folder import HOW, LAZY, MANIFEST, REMEDY
 from tests.campaign import campaign
 from tests.commands import TINY, brakecli, ended, environment, started, wait_until
 
@@ -29,14 +30,15 @@ def made(monkeypatch: pytest.MonkeyPatch) -> list[Path]:
     folders: list[Path] = []
 
     def write(folder: Path, tell: compiling.Tell) -> str:
-        (folder / "part").mkdir(exist_ok=True)
-        (folder / "part" / "a.1.nbc").write_bytes(b"code")
-        (folder / "part" / "a.nbi").write_bytes(b"index")
+        (folder / "a.part").mkdir(exist_ok=True)
+        (folder / "a.part" / "a.1.nbc").write_bytes(b"code")
+        (folder / "a.part" / "a.nbi").write_bytes(b"index")
+        beforehand.vouch(folder / "a.part")
         tell(1, 1)
         folders.append(folder)
         return ""
 
-    monkeypatch.delenv(beforehand.VARIABLE, raising=False)
+    monkeypatch.delenv(HOW, raising=False)
     monkeypatch.setattr(beforehand, "_compiled", write)
     return folders
 
@@ -45,25 +47,26 @@ def test_what_is_there_is_not_compiled_again(made: list[Path], tmp_path: Path) -
     for _ in range(3):
         assert beforehand.prepare(tmp_path, FACTS) == ""
     assert made == [tmp_path]
-    assert beforehand.names(tmp_path, tmp_path / "part" / "a.nbi")
-    assert not beforehand.names(tmp_path, tmp_path / "part" / "b.nbi")
-    assert not beforehand.names(tmp_path / "part", tmp_path / "part" / "a.nbi")
+    assert beforehand.is_sound(tmp_path / "a.part")
+    assert not beforehand.is_sound(tmp_path / "b.part")
+    (tmp_path / "a.part" / "a.1.nbc").write_bytes(b"core")  # as long as before
+    assert not beforehand.is_sound(tmp_path / "a.part")
 
 
 def _shorten(folder: Path) -> None:
-    (folder / "part" / "a.1.nbc").write_bytes(b"cod")
+    (folder / "a.part" / "a.1.nbc").write_bytes(b"cod")
 
 
 def _remove(folder: Path) -> None:
-    (folder / "part" / "a.nbi").unlink()
+    (folder / "a.part" / "a.nbi").unlink()
 
 
 def _break(folder: Path) -> None:
-    (folder / beforehand.MANIFEST).write_text("{")
+    (folder / MANIFEST).write_text("{")
 
 
 def _list(folder: Path) -> None:
-    (folder / beforehand.MANIFEST).write_text("[1]")
+    (folder / MANIFEST).write_text("[1]")
 
 
 @pytest.mark.parametrize("change", [_shorten, _remove, _break, _list, beforehand.forget])
@@ -71,11 +74,11 @@ def test_what_does_not_fit_is_made_anew_as_a_whole(
     made: list[Path], tmp_path: Path, change: Callable[[Path], None]
 ) -> None:
     beforehand.prepare(tmp_path, FACTS)
-    (tmp_path / "part" / "old.nbc").write_bytes(b"")
+    (tmp_path / "a.part" / "old.nbc").write_bytes(b"")
     change(tmp_path)
     assert beforehand.prepare(tmp_path, FACTS) == ""
     assert len(made) == 2
-    assert not (tmp_path / "part" / "old.nbc").exists()
+    assert not (tmp_path / "a.part" / "old.nbc").exists()
     assert beforehand.prepare(tmp_path, FACTS) == ""
     assert len(made) == 2
 
@@ -91,11 +94,11 @@ def test_other_versions_and_touched_sources_are_made_anew(
     assert len(made) == 3
 
 
-@pytest.mark.parametrize("mode", [beforehand.LAZY, beforehand.CHILD])
+@pytest.mark.parametrize("mode", [LAZY, beforehand.CHILD])
 def test_whoever_compiles_himself_waits_for_nobody(
     made: list[Path], tmp_path: Path, mode: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(beforehand.VARIABLE, mode)
+    monkeypatch.setenv(HOW, mode)
     assert beforehand.prepare(tmp_path, FACTS) == ""
     assert made == []
 
@@ -106,16 +109,25 @@ def test_what_keeps_children_from_compiling_is_told_with_the_remedy(
     with monkeypatch.context() as patch:
         patch.setattr(os, "statvfs", lambda path: SimpleNamespace(f_bavail=1, f_frsize=4096))
         told = beforehand.prepare(tmp_path, FACTS)
-        assert told.endswith(f"(found {tmp_path}); free 200 MB there, or {beforehand.REMEDY}")
+        assert told.endswith(f"(found {tmp_path}); free 30 MB there, or {REMEDY}")
     with monkeypatch.context() as patch:
         patch.setattr(resource, "getrlimit", lambda which: (10**9, 10**9))
         assert beforehand.prepare(tmp_path, FACTS).endswith("raise the limit with: ulimit -v unlimited")
     with monkeypatch.context() as patch:
         patch.setattr(sys, "executable", "")
         assert beforehand.prepare(tmp_path, FACTS).endswith("call brakecli once from a shell")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    before = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1000, limits[1]))
+    try:
+        told = beforehand.prepare(tmp_path, FACTS)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, before)
+    assert "8 MB cannot be written: file too large" in told
     (tmp_path / "file").write_text("in the way")
     told = beforehand.prepare(tmp_path / "file", FACTS)
-    assert told.endswith(f"beforehand: file exists (found {tmp_path}/file); {beforehand.REMEDY}")
+    assert told.endswith(f"beforehand: file exists (found {tmp_path}/file); {REMEDY}")
     assert made == []
 
 
@@ -123,7 +135,7 @@ def test_an_unknown_way_to_compile_is_told(
     made: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     told: list[str] = []
-    monkeypatch.setenv(beforehand.VARIABLE, "later")
+    monkeypatch.setenv(HOW, "later")
     compiling.set_warning(told.append)
     try:
         assert beforehand.prepare(tmp_path, FACTS) == ""
@@ -162,7 +174,7 @@ def _folder(path: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [_fifo, _deep, _long, _link, _folder])
-@pytest.mark.parametrize("name", [beforehand.MANIFEST, "total", "part/a.nbi", "part/a.1.nbc"])
+@pytest.mark.parametrize("name", [MANIFEST, "total", "a.part/a.nbi", "a.part/a.1.nbc"])
 def test_whatever_is_in_the_place_of_a_file_is_replaced(
     made: list[Path], tmp_path: Path, make: Callable[[Path], None], name: str
 ) -> None:
@@ -174,7 +186,9 @@ def test_whatever_is_in_the_place_of_a_file_is_replaced(
     for _ in range(2):
         assert beforehand.prepare(tmp_path, FACTS) == ""
     assert len(made) == 2
-    assert not (tmp_path / "part" / "precious").exists() or (tmp_path / "part" / "precious").read_text() == "mine"
+    assert (
+        not (tmp_path / "a.part" / "precious").exists() or (tmp_path / "a.part" / "precious").read_text() == "mine"
+    )
 
 
 @pytest.mark.parametrize("make", [_fifo, _link, _folder])
@@ -183,7 +197,7 @@ def test_what_is_in_the_place_of_the_lock_is_left_alone_and_told(
 ) -> None:
     make(tmp_path / "beforehand.lock")
     told = beforehand.prepare(tmp_path, FACTS)
-    assert f"(found {tmp_path}/beforehand.lock); {beforehand.REMEDY}" in told
+    assert f"(found {tmp_path}/beforehand.lock); {REMEDY}" in told
     assert made == []
     assert not (tmp_path / "precious").exists() or (tmp_path / "precious").read_text() == "mine"
 
@@ -208,20 +222,21 @@ def test_children_that_fail_leave_no_manifest_and_their_last_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, script: str, said: str
 ) -> None:
     cache = tmp_path / "cache"
-    monkeypatch.delenv(beforehand.VARIABLE, raising=False)
+    monkeypatch.delenv(HOW, raising=False)
     monkeypatch.setattr(sys, "executable", _interpreter(tmp_path, script))
     told = beforehand.prepare(cache, FACTS)
-    assert told == f"the kernels cannot be compiled beforehand: {said} (found {cache}); {beforehand.REMEDY}"
-    assert not (cache / beforehand.MANIFEST).exists()
+    assert told == f"the kernels cannot be compiled beforehand: {said} (found {cache}); {REMEDY}"
+    assert not (cache / MANIFEST).exists()
 
 
 def test_a_complete_set_counts_though_a_child_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    script = 'echo code > "$5/a.1.nbc"; echo index > "$5/a.nbi"; printf 1 > "$5/total"; kill -9 $$'
-    monkeypatch.delenv(beforehand.VARIABLE, raising=False)
+    script = 'mkdir "$5/a.b"; echo code > "$5/a.b/a.1.nbc"; printf 1 > "$5/total"; '
+    script += f'echo \'{{"a.1.nbc": [5, {zlib.crc32(b"code" + bytes([10]))}]}}\' > "$5/a.b/stamp.json"; kill -9 $$'
+    monkeypatch.delenv(HOW, raising=False)
     monkeypatch.setattr(sys, "executable", _interpreter(tmp_path, script))
     cache = tmp_path / "cache"
     assert beforehand.prepare(cache, FACTS) == ""
-    assert (cache / beforehand.MANIFEST).exists()
+    assert (cache / MANIFEST).exists()
 
 
 def test_children_look_for_modules_where_this_process_does_but_not_in_its_folder(
@@ -231,12 +246,12 @@ def test_children_look_for_modules_where_this_process_does_but_not_in_its_folder
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", ["", str(tmp_path), "relative", "/somewhere", root])
     assert beforehand._places() == ["/somewhere", root]
-    monkeypatch.setattr(sys, "path", ["/somewhere"])
-    assert beforehand._places() == ["/somewhere", root]
+    monkeypatch.setattr(sys, "path", ["/somewhere", Path("/text")])
+    assert beforehand._places() == [root, "/somewhere"]
     (tmp_path / "gone").mkdir()
     monkeypatch.chdir(tmp_path / "gone")
     (tmp_path / "gone").rmdir()
-    assert beforehand._places() == ["/somewhere", root]
+    assert beforehand._places() == [root, "/somewhere"]
 
 
 def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
@@ -244,7 +259,7 @@ def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
 ) -> None:
     """The other one lets go of the lock once it has been told of its progress twice."""
     beforehand.prepare(tmp_path, FACTS)
-    manifest = (tmp_path / beforehand.MANIFEST).read_bytes()
+    manifest = (tmp_path / MANIFEST).read_bytes()
     beforehand.forget(tmp_path)
     (tmp_path / "total").write_text("7")
     told: list[tuple[int, int]] = []
@@ -258,7 +273,7 @@ def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
             def tell(done: int, total: int) -> None:
                 told.append((done, total))
                 if len(told) == 2:
-                    (tmp_path / beforehand.MANIFEST).write_bytes(manifest)
+                    (tmp_path / MANIFEST).write_bytes(manifest)
                     fcntl.flock(lock, fcntl.LOCK_UN)
 
             yield tell
@@ -272,18 +287,46 @@ def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
     assert made == [tmp_path]
 
 
-def test_children_come_towards_each_other() -> None:
-    kernels = [*range(8)]
-    assert [beforehand._in_turn(kernels, k, 2) for k in range(2)] == [kernels, kernels[::-1]]
-    orders = [beforehand._in_turn(kernels, k, 4) for k in range(4)]
-    assert [order[:3] for order in orders] == [[0, 1, 2], [3, 2, 1], [4, 5, 6], [7, 6, 5]]
-    assert all(sorted(order) == kernels for order in orders)
-    assert [beforehand._in_turn(kernels, k, 3)[0] for k in range(3)] == [0, 3, 4]
-    assert beforehand._in_turn(kernels, 0, 1) == kernels
+def test_one_who_waits_sees_that_all_are_there_though_the_lock_is_held_on(
+    made: list[Path], tmp_path: Path
+) -> None:
+    """As by a process that was forked by the one that compiled."""
+    beforehand.prepare(tmp_path, FACTS)
+    manifest = (tmp_path / MANIFEST).read_bytes()
+    beforehand.forget(tmp_path)
+
+    @contextmanager
+    def shown(seconds: float) -> Iterator[compiling.Tell]:
+        def tell(done: int, total: int) -> None:
+            (tmp_path / MANIFEST).write_bytes(manifest)
+
+        yield tell
+
+    compiling.set_progress(shown)
+    with (tmp_path / "beforehand.lock").open("w") as lock:
+        fcntl.flock(lock, fcntl.LOCK_EX)
+        try:
+            assert beforehand.prepare(tmp_path, FACTS) == ""
+        finally:
+            compiling.set_progress(None)
+    assert made == [tmp_path]
+
+
+@pytest.mark.parametrize(
+    ("quota", "count"), [("150000 100000", 2), ("10000 100000", 1), ("max 100000", 0), ("", 0)]
+)
+def test_the_quota_of_a_container_bounds_the_cores(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, quota: str, count: int
+) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {*range(6)})
+    monkeypatch.setattr(beforehand, "QUOTA", tmp_path / "cpu.max")
+    assert beforehand.cores() == 6
+    (tmp_path / "cpu.max").write_text(quota)
+    assert beforehand.cores() == (count or 6)
 
 
 def child(folder: Path, cache: Path, stdin: int) -> subprocess.CompletedProcess[str]:
-    changes: dict[str, str | None] = {"XDG_CACHE_HOME": str(cache), beforehand.VARIABLE: beforehand.CHILD}
+    changes: dict[str, str | None] = {"XDG_CACHE_HOME": str(cache), HOW: beforehand.CHILD}
     words = [
         sys.executable,
         "-I",
@@ -292,7 +335,6 @@ def child(folder: Path, cache: Path, stdin: int) -> subprocess.CompletedProcess[
         json.dumps(beforehand._places()),
         str(folder),
         "0",
-        "1",
     ]
     return subprocess.run(words, stdin=stdin, capture_output=True, text=True, env=environment(**changes))
 
@@ -362,11 +404,11 @@ def test_first_commands_side_by_side_wait_for_one_and_a_killed_one_leaves_nothin
     (tmp_path / "tiny.toml").write_text(TINY)
     cache: dict[str, Any] = {"XDG_CACHE_HOME": str(tmp_path / "cache")}
 
-    def kernels() -> int:
+    def compiled() -> int:
         return len([*(tmp_path / "cache").rglob("*.nbc")])
 
     with started("check", "tiny.toml", cwd=tmp_path, **cache) as first:
-        wait_until(lambda: kernels() > 3, 120.0)
+        wait_until(lambda: compiled() > 0)
         os.killpg(first.pid, signal.SIGKILL)
     with (
         started("check", "tiny.toml", cwd=tmp_path, **cache) as one,
@@ -377,19 +419,4 @@ def test_first_commands_side_by_side_wait_for_one_and_a_killed_one_leaves_nothin
     assert said.startswith(SENTENCE)
     assert brakecli("check", "tiny.toml", cwd=tmp_path, stdin="", **cache).told(0) == ""
     (folder,) = (tmp_path / "cache" / "brakecli").iterdir()
-    assert int((folder / "total").read_text()) == kernels()
-    # one that is damaged, and as long as before, is made anew with all others: here by a copy
-    kept = shutil.copytree(folder, tmp_path / "kept", ignore=shutil.ignore_patterns("*.json", "*lock*"))
-    (path,) = folder.rglob("friction.minimise-*.nbc")
-    path.write_bytes(bytes(path.stat().st_size))
-    program = f"""
-import shutil
-from brakecli.solver import beforehand
-beforehand._compiled = lambda folder, tell: str(shutil.copytree({str(kept)!r}, folder, dirs_exist_ok=True))[:0]
-from brakecli.solver import friction
-print(friction.minimise(1.0, 0.0, 1.0, 3.0, 0.0, 1.0, 0.0))
-"""
-    words = [sys.executable, "-c", program]
-    done = subprocess.run(words, env=environment(**cache), capture_output=True, text=True, check=True)
-    assert done.stdout == "(2.0, 0.0, 1.0)\n"
-    assert path.read_bytes() == next(kept.rglob("friction.minimise-*.nbc")).read_bytes()
+    assert int((folder / "total").read_text()) == compiled() > 5

@@ -8,8 +8,9 @@ import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from brakecli.solver import contact
+from brakecli.solver.contact import midpoint
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage, full_contact, full_press
+from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
 from tests.campaign import campaign, counts
@@ -440,7 +441,6 @@ def test_exact_finds_on_the_way_what_it_finds_from_nothing(pads: int) -> None:
     the gap by a hair, against a layer that knows nothing.
     """
     rng = np.random.default_rng(29)
-    evaluate = contact.load("exact")
     checked = 0
     for _ in range(pads):
         gap = random_gap(rng)
@@ -448,7 +448,7 @@ def test_exact_finds_on_the_way_what_it_finds_from_nothing(pads: int) -> None:
         levels = [gap.value(xi) for xi in gap.extremes]
         steep = gap.steepest()
         crest = gap.crest
-        layer = build_layer(evaluate, pad)
+        layer = build_layer("exact", pad)
         x = gap.x
         y = 0.0
         layer.angles[:] = gap.angles
@@ -470,7 +470,7 @@ def test_exact_finds_on_the_way_what_it_finds_from_nothing(pads: int) -> None:
             fresh = unfilled("exact", pad)
             fresh.angles[:] = layer.angles
             for each in (layer, fresh):
-                evaluate(x, y, each)
+                fill(x, y, *each)
             assert np.all(np.abs(outputs(layer.contact) - outputs(fresh.contact)) <= 1e-11 * scale)
             checked += 0 < fresh.contact.fraction < 1
     assert checked > 10 * pads
@@ -546,13 +546,14 @@ def test_hundreds_of_waves_are_summed_as_well_as_one(level: float) -> None:
     pad = build_pad(k, a, shoe, wheel, 0)
     angles = np.random.default_rng(3).uniform(-6, 0, 140)
     crest = float(shoe.g.sum() + wheel.g.sum())
-    layer = build_layer(contact.load("exact"), pad)
+    layer = build_layer("exact", pad)
     layer.angles[:] = angles
-    contact.load("exact")(1e-4, level * crest, layer)
+    fill(1e-4, level * crest, *layer)
     found = layer.contact
     if level == -1.0:
-        other = layer._replace(contact=found.copy())
-        contact.load("closed-form")(1e-4, level * crest, other)
+        other = build_layer("closed-form", pad)
+        other.angles[:] = angles
+        fill(1e-4, level * crest, *other)
         steep = float(wheel.g @ wheel.omega)
         scale = 2 * a * k * np.array([crest, 1, steep, 1, crest**2, crest * steep])
         # Phases of up to 2 pi a/1 mm = 126 rad; sums over 200 waves and their pairs.
@@ -595,20 +596,19 @@ def test_the_force_alone_is_that_of_the_whole_evaluation(waves: int, nodes: int)
     gap = Gap((*CASE_B_SHOE, *more), (*CASE_B_WHEEL, *more)[:waves], 0.05, 0.0, 0.0, 0.0, 5e7)
     pad = gap.pad(nodes)
     pairs = {
-        "midpoint": (contact.load("midpoint"), contact.load_press("midpoint")),
+        "midpoint": (midpoint.evaluate, midpoint.press),
         "closed-form": (full_contact, full_press),
     }
     for name, (whole, alone) in pairs.items():
-        layers = [build_layer(each, pad) for each in (whole, alone)]
+        layers = [build_layer(name, pad) for _ in range(2)]
         for _ in range(50):
             x = rng.uniform(-0.02, 0.02)
             y = gap.crest * (rng.uniform(-1, 1) if name == "midpoint" else -2.0)
             for evaluate, layer in zip((whole, alone), layers, strict=True):
                 layer.angles[:] = gap.angles
-                evaluate(x, y, layer)
+                evaluate(x, y, *layer)
             one, other = (layer.contact for layer in layers)
             rounding = (128 + nodes) * EPS * 2 * gap.a * gap.k * gap.crest
             assert other.normal_force == pytest.approx(one.normal_force, rel=0, abs=4.0 * rounding)
             assert (other.stiffness, other.fraction) == (one.stiffness, one.fraction)
             assert (other.kind, other.valid) == (one.kind, one.valid)
-    assert contact.load_press("exact") is contact.load("exact")

@@ -5,8 +5,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.solver.motion import Stepping
+from brakecli.solver.integrate import Stepping
+from brakecli.solver.quantities import ContactState
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 NUMEROV = ("three-layer", (1 / 12, 10 / 12, 1 / 12))
@@ -105,3 +107,41 @@ def test_friction_never_feeds_energy_in_the_frame_of_the_wheel(
         sticks = sticks + (sliding == 0.0)
     assert slips > 100
     assert sticks > 10 or not flat
+
+
+HELD_AT_A_KNOT: dict[str, Any] = {
+    "shoe": {"mass": 16.464507079599265},
+    "wheel": {
+        "radius": 0.5,
+        "times": [0.017174452809830553, 0.034348905619661106, 0.06869781123932221],
+        "angular_speeds": [0.0438512543012029, -0.0438512543012029, 0.01315537629036087],
+    },
+    "link1": {"stiffness": 1790620.2713060244, "damping": 835.0774377976629, "angle_deg": 4.972196142868441},
+    "link2": {"stiffness": 8974620.273857726, "damping": 320.3882157391155, "angle_deg": -52.60482848877393},
+    "load": {"force": 123.48687788184202},
+    "friction": {"coefficient": 1.1615395435468407},
+    "contact": {"half_length": 0.05, "stiffness": 14751827.30210386},
+    "solver": {"scheme": "event-driven", "tolerance": 1e-06, "duration": 0.08587226404915277},
+    "output": {"events": True, "sample_interval": 0.00021468066012288192},
+    "initial": {
+        "x": 1.771968114200446e-05,
+        "y": -1.9101723960709597e-05,
+        "vx": -0.00830792923367157,
+        "vy": -0.009546127944610879,
+    },
+    "roughness": {
+        "wheel": {
+            "amplitudes": [2.032004497319661e-05],
+            "wavelengths": [0.01268217147736175],
+            "phases_deg": [211.2317127291078],
+        }
+    },
+}
+"""A shoe on a rough wheel that turns back: it sticks where the wheel's speed has a knot."""
+
+
+def test_the_account_closes_over_a_knot_in_stick() -> None:
+    """The force that stick takes jumps there, by the mass times the change of the wheel's acceleration."""
+    result = simulate(Case.model_validate(HELD_AT_A_KNOT))
+    assert ContactState.STICK in result.rows[:, 7]
+    assert abs(result.energy.relative_closing_error) < 1e-4

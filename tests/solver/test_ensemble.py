@@ -8,9 +8,9 @@ import pytest
 
 from brakecli.case.system import system_of
 from brakecli.solver.ensemble import LEFT, fits, run_together
+from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.lanes.records import LANES
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Motion, solve
 from brakecli.solver.schemes import NUMEROV, QUARTERS
 from brakecli.solver.system import System
 from tests.campaign import counts
@@ -72,7 +72,7 @@ def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
     for each, rough, exact, finer in runs:
         alone = by_events(each, 1e-8)
         if exact is None or rough is None or finer is None:
-            assert alone.work.turns or alone.work.failed
+            assert len(set(alone.rows[:, 7])) > 1 or alone.work.failed
             continue
         assert apart(rough, exact) <= 5.0 * LEFT * 1e-3
         errors.append([apart(exact, alone), apart(finer, alone)])
@@ -80,7 +80,7 @@ def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
             assert exact.rows[:, column] == pytest.approx(alone.rows[:, column], rel=1e-3, abs=1.0)
         assert exact.rows[:, 6] == pytest.approx(alone.rows[:, 6], abs=2.0 / each.nodes)
         assert exact.rows[:, 7].tolist() == alone.rows[:, 7].tolist()
-        assert (exact.work.steps, exact.work.turns) == (each.steps, 0)
+        assert exact.work.steps == each.steps
         compared += 1
         partly += exact.work.evaluators.get("midpoint", 0) > 100
     assert compared > 0.7 * lanes

@@ -7,18 +7,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numba import void
 from scipy.linalg import expm
 
 from brakecli.runs.own_error import Known
 from brakecli.runs.together import SAFETY
-from brakecli.solver.compile import Floats, kernel
+from brakecli.solver.arrays import Floats
 from brakecli.solver.ensemble import filled, fits, run_together, shared
+from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.lanes import _touch
 from brakecli.solver.lanes.carried import _leave_out
-from brakecli.solver.lanes.records import DISTURBED, LANE_TYPE, LANES, SHARED, Shared
+from brakecli.solver.lanes.records import DISTURBED, LANES, Shared
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Motion, solve
 from brakecli.solver.system import System
 from tests.campaign import counts
 from tests.solver.test_ensemble import drawn, system
@@ -40,11 +39,10 @@ def true_errors(run: Motion) -> np.ndarray:
     return np.asarray(np.abs(run.rows[:, :4] - exact).max(axis=0) / np.abs(exact).max(axis=0))
 
 
-@kernel(void(LANE_TYPE, SHARED))
-def evaluate(o: Any, shared: Shared) -> None:
-    """The contact at `at_x` and `at_y` at t = 0, with what its nodes leave out."""
-    _touch(o, shared, 0.0)
-    _leave_out(o, shared)
+def evaluate(o: Any, shared: Shared, tables: Floats) -> None:
+    """The contact at `at_x` and `at_y` at t = 0, with what its nodes leave out; interpreted."""
+    _touch(o, shared, tables, 0.0)
+    _leave_out(o, shared, tables)
 
 
 def gaps(system: System, x: float, y: float) -> Floats:
@@ -76,7 +74,7 @@ def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
     each = system(nodes=64)
     rng = np.random.default_rng(11)
     found = list[tuple[float, float]]()
-    alike = shared(each, DISTURBED, DISTURBED)
+    alike, tables = shared(each, DISTURBED, DISTURBED)
     spacing = 2.0 * each.half_length / each.nodes
     for _ in range(20):
         o = filled([each] * LANES)
@@ -86,7 +84,7 @@ def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
             o.at_x[n] = x
             near = level[rng.choice([0, 1, 31, 32, 62, 63])]
             o.at_y[n] = rng.choice([rng.uniform(level.min(), level.max()), near + 1e-12, near - 1e-12])
-        evaluate(o, alike)
+        evaluate(o, alike, tables)
         for n, x in enumerate(places):
             gap = gaps(each, x, o.at_y[n])
             assert o.found[n] == pytest.approx(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from brakecli.solver.ensemble import fits, run_together
+from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.lanes.records import LANES
-from brakecli.solver.motion import Motion, solve
 from brakecli.solver.system import System
 from brakecli.solver.tangent import Exponent
 from tests.solver.test_ensemble import drawn, system

@@ -14,8 +14,8 @@ from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.runs.limits import check
+from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion import Motion, Stepping, solve
 from brakecli.solver.quantities import HISTORY, ContactState, Failure
 from brakecli.solver.runge_kutta import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
 from tests.campaign import counts
@@ -383,7 +383,7 @@ def test_rest_on_the_border_of_the_friction_cone_ends() -> None:
 
 def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
-    motion.plant.state.x = math.nan  # no step from here has a known error
+    motion.state.x = math.nan  # no step from here has a known error
     work = motion.run().work
     assert work.failure is Failure.STALLED
     assert "solver.tolerance" in work.failure.sentence
@@ -391,7 +391,7 @@ def test_steps_that_shrink_to_nothing_are_a_failure_with_a_name() -> None:
 
 def test_events_without_progress_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
-    state = motion.plant.state
+    state = motion.state
     # as if 1000 of them had come, and no time gone by
     state.events = 1000
     state.events_time = 1e9
@@ -405,7 +405,7 @@ def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
     case = event_driven(SQUEAL, wheel__angular_speed=0.0, friction__coefficient=0.1)
     assert simulate(case).work.failure is Failure.NONE
     motion = Stepping(system_of(case))
-    motion.plant.state.switches = 60
+    motion.state.switches = 60
     work = motion.run().work
     assert work.failure is Failure.STALLED
     assert work.steps == 0

@@ -12,12 +12,11 @@ from scipy.interpolate import BarycentricInterpolator
 
 from brakecli.case.system import system_of
 from brakecli.runs.cost import guessed
-from brakecli.solver import contact
 from brakecli.solver.contact import pad as pads
-from brakecli.solver.contact.pad import Pad, build_layer, build_pad, interpolation_error, window_rows
+from brakecli.solver.contact.force import fill
+from brakecli.solver.contact.pad import ContactLayer, Pad, build_layer, build_pad, interpolation_error, window_rows
+from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion import solve
-from brakecli.solver.records import Layer
 from brakecli.solver.roughness import Surface, surface, turn
 from brakecli.solver.schemes import QUARTERS
 from tests.examples import ROUGH, make
@@ -38,16 +37,15 @@ def wheel_of(waves: int, seed: int = 0, shortest: float = 0.004) -> Surface:
     )
 
 
-def found(layer: Layer, x: float, y: float, travel: float = 0.0, travel_low: float = 0.0) -> Any:
+def found(layer: ContactLayer, x: float, y: float, travel: float = 0.0, travel_low: float = 0.0) -> Any:
     """Normal force, stiffness, tangential stiffness, fraction, store and its slope."""
-    turn(travel, travel_low, layer)
-    contact.load("midpoint")(x, y, layer)
+    turn(travel, travel_low, *layer)
+    fill(x, y, *layer)
     return outputs(layer.contact)
 
 
-def both(pad: Pad) -> tuple[Layer, Layer]:
-    evaluate = contact.load("midpoint")
-    return build_layer(evaluate, pad, moving=True), build_layer(evaluate, pad)
+def both(pad: Pad) -> tuple[ContactLayer, ContactLayer]:
+    return build_layer("midpoint", pad, moving=True), build_layer("midpoint", pad)
 
 
 def walk(rng: np.random.Generator, places: int) -> Iterator[tuple[float, float, float]]:
@@ -68,7 +66,7 @@ def test_a_window_gives_the_heights_of_the_sums(waves: int, nodes: int, rows: in
     wheel = wheel_of(waves, seed=waves)
     assert window_rows(wheel, 2 * A / nodes) == rows
     window, sums = both(build_pad(K, A, SHOE, wheel, nodes))
-    assert (window.window.rows, sums.window.rows) == (rows, 0)
+    assert (window.layer.window.rows, sums.layer.window.rows) == (rows, 0)
     high = float(np.abs(wheel.g).sum() + np.abs(SHOE.g).sum())
     low = wheel.omega.max()
     # Rounding: a few units in the last place of heights and of places on the pad, x and the wave, over its length.

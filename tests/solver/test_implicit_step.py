@@ -9,13 +9,13 @@ import pytest
 from numpy.typing import NDArray
 
 from brakecli.case.system import system_of
-from brakecli.solver import contact
+from brakecli.solver.contact.force import evaluate, fill
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.friction import minimise
 from brakecli.solver.implicit_step import SOLVED, UNCONVERGED, fixed_point, newton
+from brakecli.solver.integrate import Stepping
 from brakecli.solver.method import MOST_EVALUATIONS
-from brakecli.solver.motion import Stepping
-from brakecli.solver.records import CONTACT, PROBLEM, new
+from brakecli.solver.records import PROBLEM, new
 from brakecli.solver.roughness import Surface, surface
 from tests.campaign import campaign, counts
 from tests.examples import ROUGH, make
@@ -44,8 +44,7 @@ class Step:
         self.wheel = wheel
         self.phi = phi
         self.k = k
-        self.evaluate: Any = contact.load(evaluator)
-        self.layer = build_layer(self.evaluate, build_pad(k, A, shoe, wheel, 128))
+        self.layer = build_layer(evaluator, build_pad(k, A, shoe, wheel, 128))
         self.contact = self.layer.contact
         if angles is not None:
             self.layer.angles[:] = angles
@@ -64,13 +63,14 @@ class Step:
         """F_y where the minimiser puts the shoe under the normal force `force`."""
         p = self.given
         d, e, _ = minimise(p.a_11, p.a_12, p.a_22, p.g_1, p.g_2 + force, self.phi * force, p.belt)
-        layer = self.layer._replace(contact=new(CONTACT))
-        self.evaluate(p.x_0 + p.gain * d, p.y_0 + p.gain * e, layer)
+        layer = self.layer.layer.copy()
+        evaluate(p.x_0 + p.gain * d, p.y_0 + p.gain * e, layer, *self.layer[1:])  # interpreted, as the step is
         return float(layer.contact.normal_force)
 
     def run(self, solve: Any = newton, most: int = MOST_EVALUATIONS["newton"]) -> tuple[int, int, int]:
         self.problem = self.given.copy()
-        outcome: tuple[int, int, int] = solve(self.layer, self.problem, most)
+        with np.errstate(all="ignore"):  # as compiled code does
+            outcome: tuple[int, int, int] = solve(*self.layer, self.problem, most)
         return outcome
 
     @property
@@ -246,13 +246,13 @@ def test_every_step_of_a_run_meets_the_tolerance_with_one_evaluation_in_most(sch
     """A pad that opens and closes: the contact evaluated again where each step has put the shoe."""
     system = system_of(make(ROUGH, solver__scheme=scheme))
     run = Stepping(system)
-    found = new(CONTACT)
     open_steps = 0
     for level in range(int(run.counts.level) + 1, 701):
         run.block(level)
         p = run.plant.problem
-        layer = run.plant.layer._replace(contact=found)
-        system.evaluate(p.x_0 + p.gain * p.d, p.y_0 + p.gain * p.e, layer)
+        layer = run.plant.layer.copy()
+        fill(p.x_0 + p.gain * p.d, p.y_0 + p.gain * p.e, layer, run.contact.tables, run.contact.scratch.copy())
+        found = layer.contact
         rounding = 4 * EPS * found.stiffness * (abs(p.y_0) + abs(p.gain * p.e))
         assert (
             abs(found.normal_force - p.normal_force) <= 2e-13 * max(p.normal_force, found.normal_force) + rounding
@@ -284,9 +284,10 @@ def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float)
     assert abs(step.problem.residual) > 0.1 * step.force  # and the residual tells how far off
 
 
-def test_a_fixed_point_that_fails_is_never_taken_for_solved() -> None:
+@pytest.mark.parametrize("steps", counts(100, 500))  # interpreted, of hundreds of evaluations each
+def test_a_fixed_point_that_fails_is_never_taken_for_solved(steps: int) -> None:
     outcomes = []
-    for _, step in random_steps(36, 500, (-1.0, 4.0)):
+    for _, step in random_steps(36, steps, (-1.0, 4.0)):
         outcome, evaluations, _ = step.run(fixed_point, MOST_EVALUATIONS["fixed-point"])
         outcomes.append(outcome)
         residual = abs(step.force_at(step.force) - step.force)
@@ -296,7 +297,7 @@ def test_a_fixed_point_that_fails_is_never_taken_for_solved() -> None:
             assert outcome == UNCONVERGED
             assert evaluations == MOST_EVALUATIONS["fixed-point"]
             assert abs(step.problem.residual) == residual > 0.0
-    assert 50 < outcomes.count(SOLVED) < 450
+    assert 0.1 * steps < outcomes.count(SOLVED) < 0.9 * steps
 
 
 @pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
@@ -325,14 +326,15 @@ def test_a_shoe_that_just_touches_is_solved(evaluator: str, solve: Any) -> None:
         assert 0.0 <= step.force <= 2 * A * 1e8 * 8 * math.ulp(1e-5)
 
 
-def test_a_stuck_shoe_moves_with_the_wheel_exactly() -> None:
+@pytest.mark.parametrize("steps", counts(100, 300))
+def test_a_stuck_shoe_moves_with_the_wheel_exactly(steps: int) -> None:
     stuck = 0
-    for _, step in random_steps(37, 300, (-2.0, 3.0)):
+    for _, step in random_steps(37, steps, (-2.0, 3.0)):
         for solve, most in ((newton, 100), (fixed_point, 500)):
             if step.run(solve, most)[0] == SOLVED and step.problem.side == 0.0:
                 stuck += 1
                 assert step.problem.d == step.given.belt
-    assert stuck > 30
+    assert stuck > 0.1 * steps
 
 
 def test_an_explicit_scheme_evaluates_the_contact_once() -> None:

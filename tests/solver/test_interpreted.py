@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from brakecli.solver import kernels
 from brakecli.solver.contact import EVALUATORS
-from brakecli.solver.kernel_cache import config
+from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.schemes import SCHEMES as ROWS
 
 ON_NODES = {"window", *(name for name, row in EVALUATORS.items() if row.needs_nodes)}
@@ -71,7 +72,7 @@ def histories() -> dict[str, NDArray[np.float64]]:
     """The samples of every scheme with every evaluator, the evaluations that they took, and what loops noted."""
     from brakecli.case.case import Case
     from brakecli.case.system import system_of
-    from brakecli.solver.motion import solve
+    from brakecli.solver.integrate import solve
 
     found = {}
     for scheme, evaluator in PAIRS:
@@ -92,7 +93,7 @@ def histories() -> dict[str, NDArray[np.float64]]:
 
 @pytest.fixture(scope="module")
 def both(tmp_path_factory: pytest.TempPathFactory) -> tuple[dict[str, Any], dict[str, Any]]:
-    assert not config.DISABLE_JIT
+    assert wheel_angles in kernels.entries
     path = tmp_path_factory.mktemp("interpreted") / "interpreted.npz"
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     root = Path(__file__).parents[2]

@@ -1,17 +1,20 @@
 """What a run does whatever the case: samples, blocks, symmetry, iterations, extremes."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from brakecli.analysis.stability.discrete import step_limits
+from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.solver import motion as simulation
+from brakecli.solver import integrate as simulation
 from brakecli.solver import schemes
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import Failure
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, make, simulate
+from tests.solver.test_interpreted import case as changing
 
 SCHEMES = [(name, row.theta) for name, row in schemes.SCHEMES.items() if not row.own_steps]
 
@@ -27,6 +30,21 @@ def test_cutting_a_run_into_blocks_changes_no_bit(
     assert np.array_equal(whole.rows, pieces.rows)
     assert whole.energy == pieces.energy
     assert len(whole.rows) == 201
+
+
+@pytest.mark.parametrize("scheme", schemes.SCHEMES)
+def test_cutting_a_run_changes_no_bit_of_what_is_noted_while_speed_and_load_change(
+    scheme: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    evaluator = "closed-form" if schemes.SCHEMES[scheme].exact else "exact"
+    system = replace(system_of(Case.model_validate(changing(scheme, evaluator))), tracked=True)
+    whole = solve(system).track
+    monkeypatch.setattr(simulation, "BLOCK_SECONDS", 0.0)
+    pieces = solve(system).track
+    assert whole is not None
+    assert pieces is not None
+    for one, other in zip((*whole.kept, whole.works), (*pieces.kept, pieces.works), strict=True):
+        np.testing.assert_array_equal(one, other)
 
 
 @pytest.mark.parametrize(("scheme", "theta"), SCHEMES)

@@ -12,6 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from brakecli.solver import contact
+from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.roughness import PI, height, surface, wheel_angles
 from brakecli.solver.schedules import integral_at, schedule
@@ -175,10 +176,9 @@ def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
     shoe = surface(
         [each[0] for each in SHOE], wavelengths=[each[1] for each in SHOE], phases_deg=[each[2] for each in SHOE]
     )
-    evaluate = contact.load(evaluator)
-    layer = build_layer(evaluate, build_pad(K, A, shoe, wheel, 0))
+    layer = build_layer(evaluator, build_pad(K, A, shoe, wheel, 0))
     wheel_angles(wheel.waves, *integral_at(schedule(times, speeds, radius), t, t_low), layer.angles)
-    evaluate(x, y, layer)
+    fill(x, y, *layer)
     found = layer.contact
 
     time = Fraction(t) + Fraction(t_low)

@@ -5,13 +5,17 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicHermiteSpline
 from scipy.linalg import expm
 
 from brakecli.case.system import system_of
-from brakecli.solver.automaton import BACKWARD, FORWARD, HEIGHT, OPEN, SLIDING, STICK
-from brakecli.solver.compile import Floats
-from brakecli.solver.flow.smooth import DONE, EVENTFUL, MOST_EVENTS, SmoothFlow
-from brakecli.solver.motion import solve
+from brakecli.solver.arrays import Floats
+from brakecli.solver.integrate import solve
+from brakecli.solver.motion.advance import DONE, EVENTFUL
+from brakecli.solver.motion.cubic import lowest
+from brakecli.solver.motion.flow import SmoothFlow
+from brakecli.solver.motion.phases import BACKWARD, FORWARD, HEIGHT, OPEN, SLIDING, STICK
+from brakecli.solver.motion.record import MOST_SMOOTH_EVENTS
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from tests.analysis.shoes import Shoe, random_shoes
@@ -202,9 +206,26 @@ def test_a_motion_of_too_many_events_is_given_up() -> None:
         rest = steady_sliding(system)
         start = np.array([rest.x, rest.y, 0.0, 3.0 * abs(rest.y) * 2.0 * np.pi * system.natural_frequencies[1]])
         if flow(start, 1e3 / system.natural_frequencies[0]) == EVENTFUL:
-            assert flow.path.events == MOST_EVENTS
+            assert flow.path.events == MOST_SMOOTH_EVENTS
             return
     raise AssertionError
+
+
+@pytest.mark.parametrize("slope", [0.01, 0.3])
+def test_a_margin_that_rises_at_both_ends_may_be_lowest_inside(slope: float) -> None:
+    cubic = CubicHermiteSpline([0.0, 1.0], [0.1, 0.12], [slope, 1.5])
+    place = max(cubic.derivative().roots())
+    assert lowest(0.1, slope, 0.12, 1.5) == pytest.approx((place, float(cubic(place))), rel=1e-12)
+    assert lowest(0.1, 1.0, 2.0, 1.0)[0] == -1.0  # it rises all the way
+
+
+@pytest.mark.parametrize("fall", [-1e-30, -1e-9, -0.3])
+def test_the_lowest_place_of_a_margin_is_that_of_its_cubic(fall: float) -> None:
+    """Also where it hardly falls: then rounding leaves nothing of what the place was divided by."""
+    for end, rise in ((1.1, 2.0), (0.5, 0.1), (3.0, 0.2)):
+        cubic = CubicHermiteSpline([0.0, 1.0], [1.0, end], [fall, rise])
+        inside = [cubic(place) for place in cubic.derivative().roots() if 0.0 <= place <= 1.0]
+        assert lowest(1.0, fall, end, rise)[1] == pytest.approx(min(inside), rel=1e-12)
 
 
 def test_rough_pads_and_changing_speeds_are_refused() -> None:

@@ -14,7 +14,7 @@ from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.solver.motion import Motion, Stepping, solve
+from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
 from tests.analysis.shoes import Tables, random_shoes

@@ -10,7 +10,7 @@ import pytest
 
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.solver.motion import Motion, solve
+from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import MOST_EVENTS, PARTS, WORK
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, TURN, Track

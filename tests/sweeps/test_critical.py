@@ -13,8 +13,8 @@ from brakecli.branches.line import Line
 from brakecli.case.case import changed
 from brakecli.case.system import system_of
 from brakecli.front.inputs import load_sweep
+from brakecli.solver.integrate import solve
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.motion import solve
 from brakecli.solver.period import common_period
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial

@@ -19,8 +19,9 @@ from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError
 from brakecli.files.fields import POINT
 from brakecli.runs.settled import Judged
-from brakecli.solver.flow.smooth import DONE, EVENTFUL, SmoothFlow
-from brakecli.solver.motion import solve
+from brakecli.solver.integrate import solve
+from brakecli.solver.motion.advance import DONE, EVENTFUL
+from brakecli.solver.motion.flow import SmoothFlow
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import Initial, System
 from brakecli.sweeps.driver import journal_path

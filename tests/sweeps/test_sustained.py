@@ -14,7 +14,7 @@ from brakecli.branches.begin import on_smooth_pads, settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.line import Shoe
 from brakecli.case.system import system_of
-from brakecli.solver.flow.smooth import SmoothFlow
+from brakecli.solver.motion.flow import SmoothFlow
 from brakecli.sweeps.read_off import explored
 from brakecli.sweeps.sustained import _by_runs, sustained
 from brakecli.sweeps.tables import Critical

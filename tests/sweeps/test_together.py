@@ -21,8 +21,8 @@ from brakecli.runs.judge import asked, given
 from brakecli.runs.together import TOGETHER, certify_together
 from brakecli.runs.tolerance import certify
 from brakecli.solver.history import array_history
+from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion import solve
 from brakecli.sweeps.plan import LoadedSweep
 from brakecli.sweeps.simulate import checked, judged, judged_together, may_suffice, simulate
 from brakecli.sweeps.workers.task import compute_units

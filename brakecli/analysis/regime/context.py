@@ -15,7 +15,7 @@ from brakecli.analysis.stability.discrete import spectral_radius, without_dampin
 from brakecli.analysis.stability.linear import Theory, theory_of
 from brakecli.analysis.stability.modes import growth, is_undamped, locks_from, slowest_of_cycles
 from brakecli.errors import CaseError
-from brakecli.solver.schedules import value_at
+from brakecli.solver.schedules import value_at, values
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
@@ -61,7 +61,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
     """What a verdict has to know of a system, the theory of which may be known already."""
     belt = float(value_at(system.belt, system.sampled_duration))
     c = system.coefficients
-    compression = float(np.abs(system.load["value"]).max()) / (c.c_yy + system.contact_stiffness)
+    compression = float(np.abs(values(system.load)).max()) / (c.c_yy + system.contact_stiffness)
 
     @cache
     def stiffness() -> float:  # in the mean, for which nodes are good enough, and thirty times cheaper

@@ -63,12 +63,12 @@ def ripple(
     if samples < _FEWEST or not 0 < work <= _MOST_WORK or system.method.step is None or end.touches():
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
-    layer = build_layer(system.evaluate, pad, moving=True)
+    layer = build_layer(system.evaluator, pad, moving=True)
     names = ("x", "y", "vx", "normal_force")
     x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in names)
     travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
     finer = np.zeros(samples)
-    forces_along(np.ascontiguousarray(y), travel, layer, finer)
+    forces_along(np.ascontiguousarray(y), travel, *layer, finer)
     stiffness = stiffness_of()
     c = system.coefficients
     window = np.hanning(samples)

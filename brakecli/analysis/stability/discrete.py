@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.contact.closed_form import evaluate as closed_form
 from brakecli.solver.contact.pad import build_layer, build_pad
+from brakecli.solver.implicit_step import newton
 from brakecli.solver.method import MOST_EVALUATIONS, Method
 from brakecli.solver.records import PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
@@ -64,9 +64,7 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     It acts on the scheme's memory of the motion, with velocities times h. The step is taken from a deep, loaded
     equilibrium and from its neighbours: while nothing opens or sticks, it is affine and differences are exact.
     """
-    from brakecli.solver.implicit_step import newton  # its kernels are compiled only where they are needed
-
-    layer = build_layer(closed_form, build_pad(contact_stiffness, 0.5, surface(), surface(), 0))
+    layer = build_layer("closed-form", build_pad(contact_stiffness, 0.5, surface(), surface(), 0))
     # y = -1, x = 0 is the equilibrium under a load of the size of the contact stiffness.
     loaded = c._replace(sin_beta=c.c_xy / contact_stiffness + c.phi, cos_beta=1.0 + c.c_yy / contact_stiffness)
     scales = [1.0 / s.h if name in scheme.VELOCITIES else 1.0 for name in scheme.MEMORY]
@@ -80,7 +78,7 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
         if moved is not None:
             state[moved] += by
         scheme.prepare(loaded, s, state, problem)
-        newton(layer, problem, MOST_EVALUATIONS["newton"])
+        newton(*layer, problem, MOST_EVALUATIONS["newton"])
         scheme.finish(loaded, s, state, problem, layer.contact, new(WORK))
         return np.array([state[name] for name in scheme.MEMORY]) / scales
 

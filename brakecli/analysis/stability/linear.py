@@ -25,8 +25,8 @@ from brakecli.analysis.stability.modes import (
     stiffness_matrix,
 )
 from brakecli.solver.alike import at_once
+from brakecli.solver.arrays import Floats as Array
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import Floats as Array
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System

@@ -6,10 +6,10 @@ A module keeps the contract `EvaluatorModule`.
 """
 
 from dataclasses import dataclass
-from importlib import import_module
-from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 if TYPE_CHECKING:
+    from brakecli.solver.arrays import Floats
     from brakecli.solver.records import Layer
 
 
@@ -18,18 +18,18 @@ class EvaluatorModule(Protocol):
     """What every evaluator has.
 
     It may also have a kernel `press` of the same signature, which finds normal force, stiffness, fraction, kind
-    and validity alone, for event-driven runs.
+    and validity alone, for event-driven runs, with a branch in `event_driven.phases`.
     """
 
-    def evaluate(self, x: float, y: float, layer: "Layer", /) -> None:
-        """Fill `layer.contact` for the shoe at (x, y): a kernel of the signature `records.EVALUATE`.
+    def evaluate(self, x: float, y: float, layer: "Layer", tables: "Floats", scratch: "Floats", /) -> None:
+        """Fill `layer.contact` for the shoe at (x, y): a kernel, with a branch of its own in `contact.force`.
 
-        The phases of the wheel's harmonics are in `layer.angles` (`roughness.turn`); on nodes heights come from
-        `heights.profiles`, and with a window there are no phases. Constants and tables are in `layer.pad` and
-        `layer.tables`. It changes nothing but the contact and `layer.scratch`, and notes its place in `kinds()`.
-        `near` and `blur` say how far F_y can be from linear nearby, which may save an evaluation; both may be
-        left. What it keeps in the scratch may save work, and change results by rounding alone. Where its work is
-        small it begins with `layer = borrowed(layer)`: reference counts would cost a third of a step.
+        The phases of the wheel's harmonics lie in the scratch from `layer.angles_at` on (`roughness.turn`); on
+        nodes heights come from `heights.profiles`, and with a window there are no phases. Constants are in
+        `layer.pad`, which says where in the tables each of them begins. It changes nothing but the contact and the
+        scratch up to the phases, and notes its place in `kinds()`. `near` and `blur` say how far F_y can be from
+        linear nearby, which may save an evaluation; both may be left. What it keeps in the scratch may save work,
+        and change results by rounding alone.
         """
 
 
@@ -64,16 +64,11 @@ def kinds() -> tuple[str, ...]:
 CLOSED_FORM, MIDPOINT, EXACT = (kinds().index(name) for name in ("closed-form", "midpoint", "exact"))
 
 
-def load(name: str) -> Any:
-    """The kernel `evaluate` of an evaluator; it is compiled on the first call of a new version."""
+def place_of(name: str) -> int:
+    """The place of an evaluator in `EVALUATORS`, by which a layer names it.
+
+    Raises ValueError where there are more kinds than a run can count.
+    """
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
-    from brakecli.solver.compile import ready
-
-    return ready(cast(EvaluatorModule, import_module(EVALUATORS[name].module)).evaluate)
-
-
-def load_press(name: str) -> Any:
-    """What finds the force alone: the kernel `press` of an evaluator, or `evaluate` where it has none."""
-    module = import_module(EVALUATORS[name].module)
-    return getattr(module, "press", module.evaluate)
+    return list(EVALUATORS).index(name)

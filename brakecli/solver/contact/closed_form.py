@@ -3,11 +3,10 @@
 import math
 from typing import Any
 
-from numba import float64, int64, void
-
-from brakecli.solver.compile import borrowed, kernel, stopped
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.records import CONTACT_TYPE, EVALUATE, PAD_TYPE, Layer
+from brakecli.solver.kernels import kernel, stopped
+from brakecli.solver.records import Layer
 from brakecli.solver.sine import sine_cosine
 
 CLEAR = 0
@@ -15,7 +14,7 @@ PARTLY = 1
 FULL = 2
 
 
-@kernel(int64(float64, PAD_TYPE))
+@kernel
 def coverage(y: float, pad: Any) -> int:
     """FULL or CLEAR where bounds on the surfaces prove that the pad touches everywhere or nowhere, or PARTLY."""
     if y >= pad.clear_from:
@@ -23,14 +22,11 @@ def coverage(y: float, pad: Any) -> int:
     return FULL if y <= pad.full_up_to else PARTLY
 
 
-@kernel(EVALUATE)
-def full_contact(x: float, y: float, layer: Layer) -> None:
+@kernel
+def full_contact(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """The pad touches everywhere: F_y = 2ak [-y - mean f1 + Σ g2 sinc(ω2 a) sin(ω2 (x - travel))]."""
-    layer = borrowed(layer)
     pad = layer.pad
-    tables = layer.tables
     contact = layer.contact
-    angles = layer.angles
     k = pad.k
     length = 2.0 * pad.half_length
     n = pad.wheel_terms
@@ -39,10 +35,10 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     ss_at = pad.ss_at
     cc_at = pad.cc_at
     pr_at = pad.pr_at
-    sines = layer.scratch[:n]
-    cosines = layer.scratch[n : 2 * n]
+    sines = scratch[:n]
+    cosines = scratch[n : 2 * n]
     for i in range(n):
-        sines[i], cosines[i] = sine_cosine(tables[omega_at + i] * x + angles[i])
+        sines[i], cosines[i] = sine_cosine(tables[omega_at + i] * x + scratch[layer.angles_at + i])
     # k ∫ (f2 - f1) and its derivative by x
     mean_force = -k * length * pad.shoe_mean
     tangential = 0.0
@@ -76,22 +72,19 @@ def full_contact(x: float, y: float, layer: Layer) -> None:
     contact.blur = 0.0
 
 
-@kernel(EVALUATE)
-def full_press(x: float, y: float, layer: Layer) -> None:
+@kernel
+def full_press(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """`full_contact` for a run that takes no derivatives by x: normal force, stiffness 2ak and fraction 1."""
-    layer = borrowed(layer)
     pad = layer.pad
-    tables = layer.tables
     contact = layer.contact
-    angles = layer.angles
     length = 2.0 * pad.half_length
     n = pad.wheel_terms
     omega_at = pad.wheel_at + pad.wheel_terms
     eights = (n + 7) // 8 * 8
     height = -pad.k * length * (pad.shoe_mean + y)
-    sines = layer.scratch[:eights]
+    sines = scratch[:eights]
     for i in range(n):
-        sines[i] = tables[omega_at + i] * x + angles[i]
+        sines[i] = tables[omega_at + i] * x + scratch[layer.angles_at + i]
     for i in range(eights):
         sines[i], _ = sine_cosine(sines[i])
     for i in range(n):
@@ -104,7 +97,7 @@ def full_press(x: float, y: float, layer: Layer) -> None:
     contact.valid = 1
 
 
-@kernel(void(CONTACT_TYPE))
+@kernel
 def clear(contact: Any) -> None:
     """The pad touches nowhere: no force, nothing stored."""
     contact.normal_force = contact.stiffness = contact.tangential = contact.fraction = 0.0
@@ -115,14 +108,13 @@ def clear(contact: Any) -> None:
     contact.valid = 1
 
 
-@kernel(EVALUATE)
-def evaluate(x: float, y: float, layer: Layer) -> None:
+@kernel
+def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """See the package; `valid` is 0 where a rough pad may touch in part, which this evaluator cannot know."""
-    layer = borrowed(layer)
     covered = coverage(y, layer.pad)
     if covered == CLEAR:
         clear(layer.contact)
     else:
-        full_contact(x, y, layer)
+        full_contact(x, y, layer, tables, scratch)
         if covered == PARTLY:
             layer.contact.valid = 0

@@ -13,13 +13,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import boolean, float64, int64, types, void
 
-from brakecli.solver.compile import Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
 from brakecli.solver.double_double import EPSILON
-from brakecli.solver.records import CONTACT_TYPE, EVALUATE, LAYER, PAD_TYPE, Layer
+from brakecli.solver.kernels import kernel, stopped
+from brakecli.solver.records import Layer
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.sine import sine_cosine
 
@@ -64,7 +64,7 @@ _WIDER = 4.0  # half widths: the next part of a cell is twice as wide as the las
 _FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it is exact
 
 
-@kernel(types.UniTuple(float64, 4)(float64, float64, int64, vector), inlined=False)
+@kernel(inline=False)
 def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, float, float]:
     """The gap f2 - f1 - y = Σ g sin(ωξ + ψ) - y at xi, m, and its first three derivatives."""
     sines = waves[_SINE * n : (_SINE + 1) * n]
@@ -86,7 +86,7 @@ def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, floa
     return gap, slope, second, third
 
 
-@kernel(float64(float64, float64, float64, float64, int64, vector), inlined=False)
+@kernel(inline=False)
 def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Floats) -> float:
     """The root of a gap that is monotone on [left, right] and changes sign: Newton inside the bracket."""
     xi = 0.5 * (left + right)
@@ -105,7 +105,7 @@ def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Fl
     return xi
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, float64, float64, int64, vector), inlined=False)
+@kernel(inline=False)
 def _followed(left: float, right: float, xi: float, y: float, n: int, waves: Floats) -> tuple[float, float]:
     """The root of a gap that is monotone on [left, right], by Halley's iteration from xi, and the slope there.
 
@@ -124,13 +124,13 @@ def _followed(left: float, right: float, xi: float, y: float, n: int, waves: Flo
     return math.nan, 0.0
 
 
-@kernel(float64(float64, float64))
+@kernel
 def _sinc_of(sine: float, z: float) -> float:
     """sin(z)/z for a sine that is already known; the quotient loses no digits, however small z is."""
     return sine / z if z != 0.0 else 1.0
 
 
-@kernel(float64(float64))
+@kernel
 def _sinc_near_zero(z: float) -> float:
     """sin(z)/z up to half a radian, by its series 1 - z²/3! + z⁴/5! - …"""
     q = z * z
@@ -138,7 +138,7 @@ def _sinc_near_zero(z: float) -> float:
     return 1.0 - q / 6.0 * (1.0 - q / 20.0 * (1.0 - q / 42.0 * (1.0 - q / 72.0 * series)))
 
 
-@kernel(void(float64, float64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+@kernel(inline=False)
 def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Add the closed integrals of a touching interval, without k: ∫ gap, its length, ∫ f2', ∫ gap²/2, ∫ gap f2'.
 
@@ -211,7 +211,7 @@ def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, 
     contact.store_x += work - y * rise
 
 
-@kernel(void(boolean, float64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+@kernel(inline=False)
 def _turn(touches: bool, place: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """From a place on the pad touches, or does not: begin an interval, or add the one that ends."""
     at = _LAST * (pad.wheel_terms + pad.shoe_terms) + _START
@@ -222,7 +222,7 @@ def _turn(touches: bool, place: float, y: float, pad: Any, waves: Floats, contac
         waves[at] = math.inf
 
 
-@kernel(void(float64, float64, int64, float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+@kernel(inline=False)
 def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Walk over the touching intervals of a cell, and keep what is proved of the cell as a whole."""
     n = pad.wheel_terms + pad.shoe_terms
@@ -273,7 +273,7 @@ def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Float
         width = _WIDER * half
 
 
-@kernel(void(float64, PAD_TYPE, vector, CONTACT_TYPE), inlined=False)
+@kernel(inline=False)
 def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
     """Pass over the pad and add every interval on which the gap is positive."""
     n = pad.wheel_terms + pad.shoe_terms
@@ -304,11 +304,10 @@ def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
     _turn(False, end, y, pad, waves, contact)
 
 
-@kernel(void(float64, float64, LAYER, vector), inlined=False)
-def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
+@kernel(inline=False)
+def _move(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats, waves: Floats) -> None:
     """Put the waves where the shoe is, and let the odometers run."""
     pad = layer.pad
-    tables = layer.tables
     n = layer.pad.wheel_terms + layer.pad.shoe_terms
     at = _LAST * n
     fourth = 0.0
@@ -320,7 +319,7 @@ def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
         omega = tables[pad.gap_at + n + i]
         psi = tables[pad.gap_at + 2 * n + i]
         if i < pad.wheel_terms:
-            psi = omega * x + layer.angles[i]
+            psi = omega * x + scratch[layer.angles_at + i]
             turns = (psi - waves[2 * n + i]) / TWO_PI
             change = TWO_PI * abs(g) * abs(turns - np.floor(turns + 0.5))
             moved = moved + change
@@ -343,10 +342,9 @@ def _move(x: float, y: float, layer: Layer, waves: Floats) -> None:
     waves[at + _ROUNDING] = EPSILON * rounding
 
 
-@kernel(EVALUATE)
-def evaluate(x: float, y: float, layer: Layer) -> None:
+@kernel(inline=False)
+def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """See the package; exact to rounding."""
-    layer = borrowed(layer)
     pad = layer.pad
     contact = layer.contact
     clear(contact)
@@ -354,8 +352,8 @@ def evaluate(x: float, y: float, layer: Layer) -> None:
     covered = coverage(y, pad)
     if covered == CLEAR:
         return
-    waves = layer.scratch[pad.edges_at :]
-    _move(x, y, layer, waves)
+    waves = scratch[pad.edges_at :]
+    _move(x, y, layer, tables, scratch, waves)
     if covered == FULL:
         _add_interval(-pad.half_length, pad.half_length, y, pad, waves, contact)
     else:

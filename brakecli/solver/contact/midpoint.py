@@ -7,16 +7,15 @@ zeros or on the order of additions. Both together make it about as fast as C for
 
 import math
 
-from numba import float64, types, void
-
-from brakecli.solver.compile import FAST, Floats, borrowed, kernel, stopped, vector
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.pad import BESIDE, TILE
 from brakecli.solver.heights import phases, profiles
-from brakecli.solver.records import EVALUATE, LAYER, Layer
+from brakecli.solver.kernels import FAST, kernel, stopped
+from brakecli.solver.records import Layer
 
 
-@kernel(types.UniTuple(float64, 6)(float64, float64, vector, vector), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float, float, float, float, float]:
     """Sums over the touching nodes of: gap, 1, rise of f2 across the cell, gap², gap times rise; and the number of
     nodes where the gap f2 - f1 - y is within reach of zero. The rise is that of a polynomial through six
@@ -42,7 +41,7 @@ def _sums(y: float, reach: float, f1: Floats, f2: Floats) -> tuple[float, float,
     return force, touching, rise / 60.0, square, work / 60.0, near
 
 
-@kernel(types.UniTuple(float64, 2)(float64, vector, vector), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
     """Sums over the touching nodes, where f2 - f1 - y > 0, of: gap, 1."""
     force = 0.0
@@ -56,7 +55,7 @@ def _pressed(y: float, f1: Floats, f2: Floats) -> tuple[float, float]:
     return force, touching
 
 
-@kernel(void(vector, vector, vector, float64, float64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _add_parts(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> None:
     """Add the wave s g cos(ωξ) + c g sin(ωξ), with s = sin ψ and c = cos ψ: its even part and its odd part."""
     for j in range(even.size):
@@ -64,7 +63,7 @@ def _add_parts(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> 
         odd[j] += c * table[j]
 
 
-@kernel(void(vector, vector, vector, vector, vector), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _add_five_parts(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
     """`_add_five`, with what is even in ξ and what is odd apart."""
     s_0 = s[0]
@@ -84,7 +83,7 @@ def _add_five_parts(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floa
         odd[j] += two + (c_3 * table[j + 6 * TILE] + c_4 * table[j + 8 * TILE])
 
 
-@kernel(types.UniTuple(float64, 2)(float64, vector, vector, vector), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _pressed_both(y: float, f1: Floats, even: Floats, odd: Floats) -> tuple[float, float]:
     """Sums over the touching nodes of a tile and of those opposite: gap, 1."""
     force = 0.0
@@ -97,12 +96,13 @@ def _pressed_both(y: float, f1: Floats, even: Floats, odd: Floats) -> tuple[floa
     return force, touching
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, LAYER))
-def _press_halves(x: float, y: float, layer: Layer) -> tuple[float, float]:
+@kernel(inline=False)
+def _press_halves(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> tuple[float, float]:
     """As `_pressed`. What is even in f2 and what is odd give two opposite heights from the tables of one node."""
     pad = layer.pad
-    tables = layer.tables
-    sines, cosines = phases(x, layer)
+    sines_at, cosines_at = phases(x, layer, tables, scratch)
+    sines = scratch[sines_at:cosines_at]
+    cosines = scratch[cosines_at : 2 * cosines_at - sines_at]
     n = pad.nodes
     waves = pad.wheel_terms
     at = pad.waves_at
@@ -114,8 +114,8 @@ def _press_halves(x: float, y: float, layer: Layer) -> tuple[float, float]:
             break
         columns = min(TILE, (left + 7) // 8 * 8)
         i = 0
-        even = layer.scratch[:columns]
-        odd = layer.scratch[TILE : TILE + columns]
+        even = scratch[:columns]
+        odd = scratch[TILE : TILE + columns]
         left = left - TILE
         for j in range(columns):
             even[j] = odd[j] = 0.0
@@ -133,8 +133,8 @@ def _press_halves(x: float, y: float, layer: Layer) -> tuple[float, float]:
     return force, touching
 
 
-@kernel(float64(float64, LAYER), inlined=False)
-def left_out(y: float, layer: Layer) -> float:
+@kernel(inline=False)
+def left_out(y: float, layer: Layer, tables: Floats, scratch: Floats) -> float:
     """What the rule leaves out of F_y (N) at the edges of patches, with the heights of the last `evaluate`.
 
     An edge at the part θ of the way between two nodes, whose gaps are g > 0 and g' < 0, cuts a cell: where the gap
@@ -147,8 +147,8 @@ def left_out(y: float, layer: Layer) -> float:
     n = layer.pad.nodes
     edges = 0.0
     hidden = 0.0
-    f1 = layer.tables[pad.nodes_at : pad.nodes_at + n]
-    f2 = layer.scratch[BESIDE : BESIDE + n]
+    f1 = tables[pad.nodes_at : pad.nodes_at + n]
+    f2 = scratch[BESIDE : BESIDE + n]
     before = f2[0] - f1[0] - y
     gap = f2[1] - f1[1] - y
     if gap * before < 0.0:
@@ -167,19 +167,19 @@ def left_out(y: float, layer: Layer) -> float:
     return pad.k * (2.0 * pad.half_length / n) * (0.125 * edges + 4.0 / 3.0 * hidden)  # type: ignore[no-any-return]
 
 
-@kernel(EVALUATE)
-def press(x: float, y: float, layer: Layer) -> None:
+@kernel
+def press(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """`evaluate` where normal force, stiffness and fraction are enough; the same but for rounding.
 
     F_y = k 2a/n Σ gap over the touching nodes, (2), and -∂F_y/∂y = k 2a/n times their number.
     """
-    layer = borrowed(layer)
     pad = layer.pad
     contact = layer.contact
     if layer.window.rows > 0:
-        force, touching = _pressed(y, *profiles(x, layer))
+        profiles(x, layer, tables, scratch)
+        force, touching = _pressed(y, tables[pad.nodes_at : pad.nodes_at + pad.nodes], scratch)
     else:
-        force, touching = _press_halves(x, y, layer)
+        force, touching = _press_halves(x, y, layer, tables, scratch)
     spacing = 2.0 * pad.half_length / pad.nodes
     contact.normal_force = pad.k * spacing * force  # Eq. (2)
     contact.stiffness = pad.k * spacing * touching
@@ -188,19 +188,19 @@ def press(x: float, y: float, layer: Layer) -> None:
     contact.valid = 1
 
 
-@kernel(EVALUATE)
-def evaluate(x: float, y: float, layer: Layer) -> None:
+@kernel
+def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """See the package. The error falls with the square of the spacing, by its kinks at the edges of patches;
     ∂F_y/∂x and ∂V/∂x take the rise of f2 from the neighbouring nodes.
     """
-    layer = borrowed(layer)
     pad = layer.pad
     contact = layer.contact
     n = layer.pad.nodes
-    f1, f2 = profiles(x, layer)
+    profiles(x, layer, tables, scratch)
+    f1 = tables[pad.nodes_at : pad.nodes_at + n]
     if stopped(pad.signals):  # the heights are not complete, and their sums would take as long as a step may
         f1 = f1[:0]
-    force, touching, rise, square, work, near = _sums(y, contact.reach, f1, f2)
+    force, touching, rise, square, work, near = _sums(y, contact.reach, f1, scratch)
     k = pad.k
     spacing = 2.0 * pad.half_length / n
     contact.normal_force = k * spacing * force  # Eq. (2)

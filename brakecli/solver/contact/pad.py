@@ -1,7 +1,6 @@
 """The pad: constants in a record, tables in one flat buffer of doubles, and the layer that an evaluator works on.
 
-One buffer because every array that an evaluator receives costs time on each of its calls. The constants named
-..._at are where a table begins in it.
+The constants named ..._at are where a table begins in it.
 """
 
 import math
@@ -12,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli import stop
-from brakecli.solver.compile import Floats, address
-from brakecli.solver.records import CONTACT, PAD, WINDOW, Layer, new
+from brakecli.solver.arrays import Floats
+from brakecli.solver.contact import place_of
+from brakecli.solver.records import LAYER, PAD, Layer, new
 from brakecli.solver.roughness import Surface, height
 
 TILE = 72
@@ -142,15 +142,36 @@ def window_width(nodes: int) -> int:
     return 3 * TILE * (-(-(nodes + 2 * BESIDE + POINTS) // TILE) + 1)
 
 
-def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = False) -> Layer:
-    """What the kernel `evaluate`, or `press` where the force is enough, works on and fills for this pad.
+class ContactLayer(NamedTuple):
+    """The springs of a pad: a record of `LAYER`, and the two arrays that its kernels get with it."""
+
+    layer: Layer
+    tables: Floats
+    scratch: Floats
+
+    @property
+    def contact(self) -> Any:
+        """What the last evaluation has found, a record of `CONTACT`."""
+        return self.layer.contact
+
+    @property
+    def angles(self) -> Floats:
+        """The phases of the wheel's harmonics, rad."""
+        begin = int(self.layer.angles_at)
+        return self.scratch[begin : begin + int(self.layer.pad.wheel_terms)]
+
+
+def build_layer(evaluator: str, pad: Pad, *, moving: bool = False, room: int = 0) -> ContactLayer:
+    """What an evaluator works on and fills for this pad, with room for further numbers at the end of the scratch.
 
     A `moving` one may have a window: places that follow each other are near each other.
     """
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    found = new(CONTACT)
-    window = new(WINDOW)
+    layer = new(LAYER)
+    layer.evaluator = place_of(evaluator)
+    layer.pad = constants
+    window = layer.window
     rows = int(constants.rows) if moving else 0
     size = int(constants.edges_at + 8 * waves + 6 + 3 * constants.cells)
     if rows:
@@ -160,18 +181,9 @@ def build_layer(evaluate: Any, pad: Pad, press: Any = None, *, moving: bool = Fa
         window.spacing = 2.0 * constants.half_length / constants.nodes / rows
         window.at = (size + POINTS + 7) // 8 * 8
         size = int(window.at + rows * window.width)
-    scratch = aligned(size)
-    found.near = math.inf  # an evaluator that does not know it leaves it
-    return Layer(
-        address(evaluate),
-        address(press or evaluate),
-        constants,
-        tables,
-        np.zeros(constants.wheel_terms),
-        scratch,
-        window,
-        found,
-    )
+    layer.angles_at = size
+    layer.contact.near = math.inf  # an evaluator that does not know it leaves it
+    return ContactLayer(layer, tables, aligned(size + int(constants.wheel_terms) + room))
 
 
 def aligned(size: int) -> Floats:

@@ -11,15 +11,15 @@ that is good enough for most steps. A run that sticks, turns, blows up or needs 
 from typing import Any
 
 import numpy as np
-from numba import float64, int64, types, void
 from numpy.typing import NDArray
 
-from brakecli.solver.compile import Floats, borrowed, kernel, stopped
+from brakecli.solver.arrays import CUBE, ROWS, VECTOR, Floats
 from brakecli.solver.friction import observed
+from brakecli.solver.kernels import entry, kernel, stopped
 from brakecli.solver.lanes.carried import carry, renew
 from brakecli.solver.lanes.records import (
     ALIKE,
-    LANE_TYPE,
+    LANE,
     LANES,
     PAIR,
     SHARED,
@@ -33,11 +33,10 @@ from brakecli.solver.quantities import BOUND
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.sine import sine_cosine
 
-_PAIR = types.UniTuple(float64, 2)
 _MOST = 8  # evaluations of the contact in a step
 
 
-@kernel(void(LANE_TYPE, SHARED, int64, float64), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
     """Sine and cosine of a wave of the wheel at the middle of the pad: of ωx + φ - 2π t times `rate`."""
     omega = shared.waves[3 * i]
@@ -48,32 +47,31 @@ def _pass(o: Any, shared: Shared, i: int, t: float) -> None:
         o.sine[i, n], o.cosine[i, n] = sine_cosine(angle)
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
-def _add_nodes(o: Any, shared: Shared) -> None:
+@kernel(fastmath=ALIKE)
+def _add_nodes(o: Any, shared: Shared, tables: Floats) -> None:
     """The midpoint sum of the gaps (m), how many nodes touch, and the gaps themselves.
 
     The gap at ξ is f2 - f1 - y, where f2 = Σ g (sin cos ωξ + cos sin ωξ) by the sine and cosine of each wave. What
     is even in ξ and what is odd give the gaps at ξ and -ξ from the table of one node.
     """
-    table = shared.table
-    gaps = shared.gaps
+    gaps = tables[shared.gaps_at :]
     at = 0
     pair = 2 * PAIR
     for n in range(LANES):
         o.found[n] = o.touches[n] = 0.0
     for _ in range(shared.nodes // 2):
-        f1 = table[at]
-        opposite = table[at + 1]
-        s_0 = table[at + 2]
-        s_1 = table[at + 3]
-        s_2 = table[at + 4]
-        s_3 = table[at + 5]
-        s_4 = table[at + 6]
-        c_0 = table[at + 7]
-        c_1 = table[at + 8]
-        c_2 = table[at + 9]
-        c_3 = table[at + 10]
-        c_4 = table[at + 11]
+        f1 = tables[at]
+        opposite = tables[at + 1]
+        s_0 = tables[at + 2]
+        s_1 = tables[at + 3]
+        s_2 = tables[at + 4]
+        s_3 = tables[at + 5]
+        s_4 = tables[at + 6]
+        c_0 = tables[at + 7]
+        c_1 = tables[at + 8]
+        c_2 = tables[at + 9]
+        c_3 = tables[at + 10]
+        c_4 = tables[at + 11]
         for n in range(LANES):
             odd = o.cosine[0, n] * s_0 + o.cosine[1, n] * s_1 + o.cosine[2, n] * s_2 + o.cosine[3, n] * s_3
             even = o.sine[0, n] * c_0 + o.sine[1, n] * c_1 + o.sine[2, n] * c_2 + o.sine[3, n] * c_3
@@ -89,13 +87,12 @@ def _add_nodes(o: Any, shared: Shared) -> None:
         pair = pair + PAIR
 
 
-@kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE, inlined=False)
-def _touch(o: Any, shared: Shared, t: float) -> None:
+@kernel(fastmath=ALIKE, inline=False)
+def _touch(o: Any, shared: Shared, tables: Floats, t: float) -> None:
     """The normal force, (2), and the part that touches: in closed form where a bound proves it, or by nodes.
 
     F_y = k ∫ max(f2 - f1 - y, 0) dξ; of a pad that touches everywhere it is k (Σ wave sin - length (y + mean f1)).
     """
-    shared = borrowed(shared)
     waves = shared.waves
     length = shared.length
     full = shared.full_up_to
@@ -107,7 +104,7 @@ def _touch(o: Any, shared: Shared, t: float) -> None:
         o.partly[n] = 1.0 if full < o.at_y[n] and o.at_y[n] < clear else 0.0
         partly |= 1 if o.partly[n] > 0.0 else 0
     if partly:
-        _add_nodes(o, shared)
+        _add_nodes(o, shared, tables)
     g_0 = waves[2]
     g_1 = waves[5]
     g_2 = waves[8]
@@ -123,7 +120,7 @@ def _touch(o: Any, shared: Shared, t: float) -> None:
         o.touches[n] = part * o.touches[n] if o.partly[n] > 0.0 else 1.0 if o.at_y[n] <= full else 0.0
 
 
-@kernel(_PAIR(LANE_TYPE, int64, *[float64] * 5))
+@kernel
 def _acceleration(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, force: float) -> tuple[float, float]:
     """By (6) and (7) without the load."""
     a_x = o.grip[n] * force - o.b_xx[n] * v_x - o.b_xy[n] * v_y - o.c_xx[n] * x - o.c_xy[n] * y
@@ -131,14 +128,14 @@ def _acceleration(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, fo
     return a_x / o.m[n], a_y / o.m[n]
 
 
-@kernel(void(LANE_TYPE, SHARED), inlined=False)
-def _begin(o: Any, shared: Shared) -> None:
+@kernel(inline=False)
+def _begin(o: Any, shared: Shared, tables: Floats) -> None:
     """The second level from the first, x¹ = x⁰ + h v⁰ + h² (2 a⁰ + a¹)/6, where `g_1` and `g_2` hold a."""
     h = shared.h
     for n in range(LANES):
         o.at_x[n], o.at_y[n], o.g_1[n], o.g_2[n] = o.x_old[n], o.y_old[n], 0.0, 0.0
     for late in range(2):
-        _touch(o, shared, late * h)
+        _touch(o, shared, tables, late * h)
         part, moves = (h * h / 6.0, 0.0) if late else (0.5 * h * h, h)
         for n in range(LANES):
             v_x = o.d[n] + h * o.g_1[n]
@@ -159,13 +156,13 @@ def _begin(o: Any, shared: Shared) -> None:
                 o.even_d[1, n] = v_x - 2.0 * h * a_x
                 o.even_e[0, n] = v_y
                 o.even_e[1, n] = v_y - 2.0 * h * a_y
-    _touch(o, shared, h)
+    _touch(o, shared, tables, h)
     for n in range(LANES):
         o.x[n], o.y[n], o.force[n], o.touching[n] = o.at_x[n], o.at_y[n], o.found[n], o.touches[n]
         o.earlier[n] = 2.0 * o.before[n] - o.force[n]
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _prepare(o: Any, shared: Shared) -> None:
     """The known part of (6) and (7) over three levels, and the guess of the force as in `loop.advance`.
 
@@ -195,8 +192,8 @@ def _prepare(o: Any, shared: Shared) -> None:
         o.done[n] = o.out[n]
 
 
-@kernel(void(LANE_TYPE, SHARED, float64), fastmath=ALIKE)
-def _iterate(o: Any, shared: Shared, t: float) -> None:
+@kernel(fastmath=ALIKE)
+def _iterate(o: Any, shared: Shared, tables: Floats, t: float) -> None:
     """The force of the next level in `guess`: as (13), until what is left is below the bound.
 
     z^{n+1} = z^{n-1} + 2h a⁻¹ (g + θ1 (φ, 1) F) by (15) and (16), and the next F adds (F_y(z) - F)/(1 + answer
@@ -211,7 +208,7 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
             y = o.y_old[n] + 2.0 * h * (o.i_12[n] * f_x + o.i_22[n] * f_y)
             o.at_x[n] = x if o.done[n] == 0.0 else o.at_x[n]
             o.at_y[n] = y if o.done[n] == 0.0 else o.at_y[n]
-        _touch(o, shared, t)
+        _touch(o, shared, tables, t)
         left = 0
         for n in range(LANES):
             waits = 1.0 - o.done[n]
@@ -225,7 +222,7 @@ def _iterate(o: Any, shared: Shared, t: float) -> None:
             return
 
 
-@kernel(void(LANE_TYPE, SHARED))
+@kernel
 def _finish(o: Any, shared: Shared) -> None:
     """The next level; a lane is out where the shoe slips to its side no more, or (13) did not converge.
 
@@ -247,7 +244,7 @@ def _finish(o: Any, shared: Shared) -> None:
         o.closed[n] += 1.0 - o.partly[n]
 
 
-@kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], int64), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> None:
     """The sample at the older level, as `loop.sample` has it; d without h²/6 of its second derivative.
 
@@ -287,14 +284,13 @@ def _sample(o: Any, shared: Shared, rows: NDArray[np.float64], number: int) -> N
         row[7] = o.state[n]
 
 
-@kernel(void(LANE_TYPE, SHARED, float64[:, :, ::1], float64[:, ::1]))
-def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) -> None:
+@entry(None, LANE, SHARED, VECTOR, CUBE, ROWS)
+def advance(o: Any, shared: Shared, tables: Floats, rows: NDArray[np.float64], sizes: Floats) -> None:
     """Run all lanes; `rows` gets the samples of each, variable by variable.
 
     `sizes` gets the growth of each disturbance in each part of the run; without parts none is carried along.
     """
-    shared = borrowed(shared)
-    _begin(o, shared)
+    _begin(o, shared, tables)
     for number in range(rows.shape[2]):
         _sample(o, shared, rows, number)
         if sizes.shape[0] > 0:
@@ -306,7 +302,7 @@ def advance(o: Any, shared: Shared, rows: NDArray[np.float64], sizes: Floats) ->
             return
         for step in range(shared.per_sample):
             _prepare(o, shared)
-            _iterate(o, shared, number * shared.interval + (step + 2) * shared.h)
+            _iterate(o, shared, tables, number * shared.interval + (step + 2) * shared.h)
             _finish(o, shared)
             if shared.first < shared.beyond:
-                carry(o, shared, number * shared.per_sample + step)
+                carry(o, shared, tables, number * shared.per_sample + step)

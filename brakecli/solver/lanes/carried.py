@@ -9,17 +9,14 @@ Of the nodes it is what `contact.midpoint.left_out` finds at every second level.
 import math
 from typing import Any
 
-from numba import boolean, float64, int64, types, void
-
-from brakecli.solver.compile import Floats, kernel, vector
+from brakecli.solver.arrays import Floats
+from brakecli.solver.kernels import kernel
 from brakecli.solver.lanes.records import (
     ALIKE,
     DISTURBED,
-    LANE_TYPE,
     LANES,
     NODES,
     PAIR,
-    SHARED,
     STEPS,
     THETA_1,
     THETA_2,
@@ -35,7 +32,7 @@ NEAR = 3.0
 """Sliding velocity over its error, from which on a stick may have been missed."""
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _miss(o: Any, shared: Shared) -> None:
     """What the motion misses of (6) and (7) with steps twice as long, between the last three even levels.
 
@@ -73,7 +70,7 @@ def _miss(o: Any, shared: Shared) -> None:
         o.source_y[n] = 2.0 / _MORE * (y_side - o.load[n] * o.cos_beta[n] - o.m[n] * a_y)
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _begin(o: Any, shared: Shared) -> None:
     """At the second level: the error of the first one, by a start with a step twice as long.
 
@@ -100,7 +97,7 @@ def _begin(o: Any, shared: Shared) -> None:
         o.even_force[1, n], o.even_force[0, n] = o.even_force[0, n], o.force[n]
 
 
-@kernel(boolean(float64, float64, float64), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _hides(before: float, gap: float, after: float) -> bool:
     """Whether the gap in the middle is so near zero beside its bend that a patch, or a hole, may lie beside it.
 
@@ -109,7 +106,7 @@ def _hides(before: float, gap: float, after: float) -> bool:
     return before * gap + after * gap > 8.0 * gap * gap and before * gap > 0.0 and after * gap >= 0.0
 
 
-@kernel(void(LANE_TYPE, vector, int64), fastmath=ALIKE, inlined=False)
+@kernel(fastmath=ALIKE, inline=False)
 def _add_hidden(o: Any, gaps: Floats, at: int) -> None:
     """Add what three nodes leave out, in spacings: a patch, or a hole, between them.
 
@@ -127,19 +124,19 @@ def _add_hidden(o: Any, gaps: Floats, at: int) -> None:
         o.missing[n] += size if _hides(before, gap, after) and extreme * gap < 0.0 else 0.0
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _cut(gap: float, after: float) -> tuple[float, float]:
     """What a cell with an edge leaves out, over an eighth of a spacing, as a fraction; 0/1 without one."""
     return ((after + gap) ** 2, abs(after - gap)) if after * gap < 0.0 else (0.0, 1.0)
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE, inlined=False)
-def _leave_out(o: Any, shared: Shared) -> None:
+@kernel(fastmath=ALIKE, inline=False)
+def _leave_out(o: Any, shared: Shared, tables: Floats) -> None:
     """`contact.midpoint.left_out` of pads that touch in part, where the contact was evaluated last.
 
     From both ends to the middle, where both halves find an edge: a pair of two such cells takes one division.
     """
-    gaps = shared.gaps
+    gaps = tables[shared.gaps_at :]
     at = 0
     half = shared.nodes // 2
     part = shared.length / shared.nodes
@@ -171,7 +168,7 @@ def _leave_out(o: Any, shared: Shared) -> None:
         o.missing[n] = part * o.k[n] * o.missing[n] if o.partly[n] > 0.0 else 0.0
 
 
-@kernel(void(LANE_TYPE, SHARED), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _contact(o: Any, shared: Shared) -> None:
     """The derivative of the contact force at the older level of the motion.
 
@@ -191,7 +188,7 @@ def _contact(o: Any, shared: Shared) -> None:
         o.feedback[n] = 1.0 / feedback if feedback != 0.0 else 0.0
 
 
-@kernel(void(LANE_TYPE, SHARED, int64), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _move(o: Any, shared: Shared, kind: int) -> None:
     """Carry one of them to the older level of the motion, by the derivative of its steps.
 
@@ -236,13 +233,13 @@ def _move(o: Any, shared: Shared, kind: int) -> None:
         o.t_force[kind, n] = force
 
 
-@kernel(float64(float64))
+@kernel
 def _size(error: float) -> float:
     """|error|; infinite where a motion has amplified it beyond all numbers."""
     return abs(error) if abs(error) < math.inf else math.inf
 
 
-@kernel(void(LANE_TYPE), fastmath=ALIKE)
+@kernel(fastmath=ALIKE)
 def _note(o: Any) -> None:
     """The largest errors, and whether the shoe may have stuck for less than a step.
 
@@ -274,8 +271,8 @@ def _note(o: Any) -> None:
         o.unsure[n] = 1.0 if o.side[n] * (o.d[n] - o.belt[n]) < dip + NEAR * d else o.unsure[n]
 
 
-@kernel(void(LANE_TYPE, SHARED, int64), inlined=False)
-def carry(o: Any, shared: Shared, step: int) -> None:
+@kernel(inline=False)
+def carry(o: Any, shared: Shared, tables: Floats, step: int) -> None:
     """Carry all that is carried along to the older level of the motion, behind a step that has been made."""
     _contact(o, shared)
     even = step % 2 == 0
@@ -297,10 +294,10 @@ def carry(o: Any, shared: Shared, step: int) -> None:
         o.source_x[n] = o.source_y[n] = o.missing[n] = 0.0
         partly |= 1 if o.partly[n] > 0.0 else 0
     if even and partly:
-        _leave_out(o, shared)
+        _leave_out(o, shared, tables)
 
 
-@kernel(void(LANE_TYPE, SHARED, float64[:, ::1], int64, int64), inlined=False)
+@kernel(inline=False)
 def renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> None:
     """At a sample that ends a part of the run, note the sizes, and go on with disturbances of size one.
 

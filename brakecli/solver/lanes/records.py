@@ -1,12 +1,9 @@
 """What lanes hold: the record of a block of lanes, and what its runs have in common."""
 
-from typing import Any, NamedTuple
-
-import numba
-from numba import float64, int64, types
+from typing import Any
 
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import FAST, Floats, vector
+from brakecli.solver.kernels import FAST
 from brakecli.solver.records import record
 from brakecli.solver.schemes import NUMEROV
 
@@ -51,26 +48,24 @@ LANE = record(
     **_lanes("unsure"),  # 1 where a stick may have been missed
     worst=(float, (3, 4, LANES)),  # largest errors of x, y, vx and vy: by steps, by nodes, and both
 )
-LANE_TYPE = numba.from_dtype(LANE)
 
 
-class Shared(NamedTuple):
-    """What the runs have in common: their grid of time, surfaces and nodes; lengths in m."""
+SHARED = record(
+    "h",  # s
+    "interval",  # between samples, s
+    "length",  # of the pad, m
+    "full_up_to clear_from shoe_mean",  # as in `records.PAD`, m
+    per_sample=int,
+    nodes=int,
+    signals=int,
+    first=int,  # kind of what is carried along
+    beyond=int,  # the kind behind the last one that is
+    gaps_at=int,  # where the gaps begin in the tables
+    waves=(float, 3 * WAVES),  # of each: wavenumber, phase, its part of the force in full contact over k sin, m²
+)
+"""What the runs have in common: their grid of time, surfaces and nodes.
 
-    h: float  # s
-    interval: float  # between samples, s
-    per_sample: int
-    nodes: int
-    length: float  # of the pad
-    full_up_to: float
-    clear_from: float
-    shoe_mean: float
-    waves: Floats  # of each: wavenumber, phase, and its part of the force in full contact over k sin, m²
-    table: Floats  # of each node of the first half: f1, f1 opposite, and g sin(ωξ), g cos(ωξ) of all waves
-    gaps: Floats  # m, by pairs, where nodes were summed last; two pairs of zeros before, and room for one behind
-    signals: int
-    first: int  # kind of what is carried along
-    beyond: int  # the kind behind the last one that is
-
-
-SHARED = types.NamedTuple([float64, float64, int64, int64, *[float64] * 4, *[vector] * 3, *[int64] * 3], Shared)
+The tables have of each node of the first half f1, f1 opposite, and g sin(ωξ), g cos(ωξ) of all waves; then the
+gaps (m), by pairs, where nodes were summed last, with two pairs of zeros before, and room for one behind.
+"""
+Shared = Any  # a record of SHARED

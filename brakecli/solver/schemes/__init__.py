@@ -1,7 +1,7 @@
 """Schemes: one file and one row of `SCHEMES` each. The rows are plain data; a file is imported when it is used.
 
 A module keeps one of the contracts below: `SteppingModule` where its steps are those of `solver.loop`, all of one
-length; `OwnStepsModule` where it finds its steps itself, held to a tolerance; `SchemeModule` where it is exact.
+length; `OwnStepsModule` where it finds its steps itself.
 """
 
 from dataclasses import dataclass
@@ -9,10 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
 
 if TYPE_CHECKING:
+    from brakecli.solver.arrays import Floats
     from brakecli.solver.coefficients import Coefficients
-    from brakecli.solver.compile import Floats
     from brakecli.solver.energy import Mechanical
-    from brakecli.solver.records import Pair, Plant, Weights
+    from brakecli.solver.records import Pair, Weights
 
 HALF: tuple[float, ...] = 0.5, 0.5
 QUARTERS: tuple[float, ...] = 0.25, 0.5, 0.25
@@ -25,6 +25,8 @@ class SchemeModule(Protocol):
 
     STATE: Any
     """Type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force."""
+    KEPT: str
+    """The field of the plant that is this record."""
     LAG: int
     """How many levels the known velocity lies behind the position."""
     MEMORY: tuple[str, ...]
@@ -47,35 +49,28 @@ class SchemeModule(Protocol):
     def mechanical_energy(self, c: "Coefficients", s: "Weights", state: Any, /) -> "Mechanical":
         """Kinetic energy and energy of the links that the scheme keeps, also of states in arrays."""
 
-    def hold(self, plant: "Plant", address: int, /) -> None:
-        """Put all that a run needs at an address, where `advance` finds it: a kernel."""
-
-    def advance(self, address: int, rows: "Floats", events: "Floats", stop: int, /) -> int:
-        """Step to the level `stop`, fill rows with the samples before each step; a `Failure`: a kernel."""
-
-    def sample(self, plant: "Plant", row: "Floats", /) -> None:
-        """Write the sample that is due."""
-
 
 @runtime_checkable
 class SteppingModule(SchemeModule, Protocol):
-    """What a scheme has besides whose steps are of one length; it takes `advance` and `sample` from the loop."""
+    """What a scheme has besides whose steps are of one length: two kernels, with branches in `schemes.steps`."""
 
     def prepare(self, c: "Coefficients", s: "Weights", state: Any, problem: Any, /) -> None:
-        """The minimisation that a step comes down to: a kernel of the signature `records.PREPARE`."""
+        """The minimisation that a step comes down to."""
 
     def finish(
         self, c: "Coefficients", s: "Weights", state: Any, problem: Any, contact: Any, work: Any, /
     ) -> None:
-        """The new state, and the works of the step: a kernel of the signature `records.FINISH`."""
+        """The new state, and the works of the step."""
 
 
 @runtime_checkable
 class OwnStepsModule(SchemeModule, Protocol):
     """What a scheme has besides that finds its steps itself. Its samples lie on the grid alone."""
 
-    solve: Any
-    """The kernel of one step, which `advance` calls at the address in `plug.solve`."""
+    def advance(
+        self, plants: Any, tables: "Floats", scratch: "Floats", rows: "Floats", events: "Floats", stop: int, /
+    ) -> int:
+        """Step to the level `stop`, fill rows with the samples before each step; a `Failure`: an entry."""
 
 
 @dataclass(frozen=True)
@@ -148,10 +143,9 @@ SCHEMES: dict[str, Scheme] = {
 
 
 def load(name: str) -> SchemeModule:
-    """The module of a scheme; its kernels are loaded before anything is timed."""
-    from brakecli.solver.compile import ready
+    """The module of a scheme; its loop is loaded before anything is timed."""
+    from brakecli.solver import kernels, loop
 
     module = cast(SchemeModule, import_module(SCHEMES[name].module))
-    ready(module.advance)
-    ready(getattr(module, "solve", module.advance))  # that of a scheme which finds its steps itself
+    kernels.load(module.advance if isinstance(module, OwnStepsModule) else loop.advance)
     return module

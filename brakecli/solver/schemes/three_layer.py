@@ -2,16 +2,14 @@
 
 from typing import Any
 
-from brakecli.solver import loop, records
+from brakecli.solver import records
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import kernel
 from brakecli.solver.energy import Mechanical, links_energy
+from brakecli.solver.kernels import kernel
 from brakecli.solver.records import Pair, Weights
 
 STATE = records.STATE
-hold = loop.hold
-advance = loop.advance
-sample = loop.sample
+KEPT = "state"
 LAG = 1
 MEMORY: tuple[str, ...] = ("x", "y", "x_old", "y_old")
 VELOCITIES: tuple[str, ...] = ()
@@ -50,7 +48,7 @@ def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
     return kinetic, links, (x, y), 0.5
 
 
-@kernel(records.PREPARE)
+@kernel
 def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
     """(14), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
     h = s.h
@@ -76,7 +74,7 @@ def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
     problem.normal_force = state.force
 
 
-@kernel(records.FINISH)
+@kernel
 def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
     """x at the new level is x two levels back plus 2hd; and the works: the scheme times half that displacement.
 

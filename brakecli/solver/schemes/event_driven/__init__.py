@@ -4,38 +4,35 @@ Its steps are its own. Each component keeps the tolerance, relative to the large
 slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped over.
 """
 
-from numba import float64, int64, void
+from typing import Any
 
 from brakecli.solver import own_steps
-from brakecli.solver.automaton import CONE, OPEN, STICK, side_of
-from brakecli.solver.compile import Floats, at_address, from_memory, into_memory, kernel
+from brakecli.solver.arrays import ROWS, VECTOR, Floats
 from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.contact.force import evaluate
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.friction import observed
-from brakecli.solver.motions import MOTION, V_X, V_Y, X, Y
+from brakecli.solver.kernels import entry, kernel
+from brakecli.solver.motion.phases import CONE, OPEN, STICK, side_of
+from brakecli.solver.motion.record import V_X, V_Y, X, Y
+from brakecli.solver.motions import MOTION
+from brakecli.solver.plant import PLANT, Plant
 from brakecli.solver.quantities import Failure
-from brakecli.solver.records import EVALUATE, Plant, Weights, plant_type
+from brakecli.solver.records import Weights
 from brakecli.solver.runge_kutta import interpolated
-from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe, press, resistance
-from brakecli.solver.schemes.event_driven.step import STEP, first_step, step
+from brakecli.solver.schemes.event_driven.phases import press, resistance
+from brakecli.solver.schemes.event_driven.step import first_step, step
 from brakecli.solver.tangent import renew
 from brakecli.solver.track import mark
 
 STATE = MOTION
-solve = step
+KEPT = "motion"
 LAG = own_steps.LAG
 MEMORY = own_steps.MEMORY
 VELOCITIES = own_steps.VELOCITIES
 begin = own_steps.begin
-sample = own_steps.sample
 weighted_time = own_steps.weighted_time
 mechanical_energy = own_steps.mechanical_energy
-
-_PLANT = plant_type(MOTION)
-hold = into_memory(_PLANT)
-_plant_at = from_memory(_PLANT)
-_evaluate_at = at_address(EVALUATE)
-_step_at = at_address(STEP)  # compiled in its own place: otherwise `advance` would compile it again
 
 _BUDGET = 4096
 _EXACT = 64
@@ -54,8 +51,8 @@ def order(s: Weights, start: str) -> int:
     return 8
 
 
-@kernel(void(SHOE, float64, int64), inlined=False)
-def _sample(p: Shoe, interval: float, level: int) -> None:
+@kernel(inline=False)
+def _sample(p: Plant, tables: Floats, scratch: Floats, interval: float, level: int) -> None:
     """Put the sample of a level that the motion has reached into the state, with the forces at its time."""
     c = p.c
     m = p.motion
@@ -87,7 +84,7 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
             at = m.x
             x = m.x + passed
             v_x = belt
-    normal = max(press(p, at, y, phase), 0.0)
+    normal = max(press(p, tables, scratch, at, y, phase), 0.0)
     bound = c.phi * normal
     against_x, _ = resistance(c, load, x, y, v_x, v_y)
     needed = c.m * belt_slope + against_x  # Eq. (6) in stick
@@ -103,56 +100,54 @@ def _sample(p: Shoe, interval: float, level: int) -> None:
     m.row[7] = state
 
 
-@kernel(void(SHOE, int64), inlined=False)
-def _mark(p: Shoe, samples: int) -> None:
+@kernel(inline=False)
+def _mark(p: Plant, tables: Floats, scratch: Floats, samples: int) -> None:
     """Make a mark where the motion is."""
     m = p.motion
     store = p.motion.stores[0]
     if m.light == 1:
-        _evaluate_at(p.layer.evaluate)(m.x, m.y, p.layer)
+        evaluate(m.x, m.y, p.layer, tables, scratch)
         store = p.layer.contact.store
-    at = mark(p.track, p.work, m.level, samples, m.time + m.tau, store)
+    at = p.track.states[mark(p.track, p.work, m.level, samples, m.time + m.tau, store)]
     at[0] = m.x
     at[1] = m.y
     at[2] = m.v_x
     at[3] = m.v_y
 
 
-@kernel(int64(int64, float64[:, ::1], float64[:, ::1], int64))
-def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
+@entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
+def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int) -> int:
     """Step until the sample `stop` is reached, or until the budget of a call is spent; a `Failure`.
 
     `rows` gets the samples before that of counts.level, which waits in the state; a failure adds it.
     """
-    p: Plant = _plant_at(address)
-    m = p.state
+    p = plants[0]
+    m = p.motion
     counts = p.counts
-    drive = p.drive
     grid = p.grid
     row = 0
     steps = 0
     waves = p.layer.pad.shoe_terms + p.layer.pad.wheel_terms if p.layer.window.rows == 0 else 0
-    shoe = Shoe(p.c, p.layer, m, p.work, counts, p.tangent, p.track)
     track = p.track
     if m.started == 0:
-        first_step(shoe, drive, grid)
-        _sample(shoe, grid.interval, 0)
+        first_step(p, tables, scratch, grid)
+        _sample(p, tables, scratch, grid.interval, 0)
         m.started = 1
         if track.on == 1:
             track.phase = m.phase if m.touch[0, 0] > 0.0 else OPEN
-            _mark(shoe, grid.samples)
+            _mark(p, tables, scratch, grid.samples)
     while True:
         while counts.level < stop and counts.level < m.level:
             for column in range(rows.shape[1]):  # a slice would take seconds to compile
                 rows[row, column] = m.row[column]
             row += 1
             counts.level += 1
-            _sample(shoe, grid.interval, counts.level)
+            _sample(p, tables, scratch, grid.interval, counts.level)
             if p.tangent.on == 1:
                 renew(p.tangent, counts.level, grid.samples)
         if counts.level == stop or steps >= _BUDGET:
             return _NONE
-        failure: int = _step_at(p.plug.solve)(shoe, drive, grid)
+        failure: int = step(p, tables, scratch, grid)
         if p.tangent.beyond == 1:
             failure = _COARSE
         steps += (
@@ -165,4 +160,4 @@ def advance(address: int, rows: Floats, events: Floats, stop: int) -> int:
                 rows[row, column] = m.row[column]
             return failure
         if track.on == 1 and m.level >= track.next:
-            _mark(shoe, grid.samples)
+            _mark(p, tables, scratch, grid.samples)

@@ -6,20 +6,22 @@ cut into as many parts as Gauss's rule has places: in each, A and what is missed
 """
 
 import math
+from typing import Any
 
 import numpy as np
-from numba import float64, int64, void
 
 from brakecli.solver import runge_kutta
-from brakecli.solver.automaton import OPEN, STICK, side_of
-from brakecli.solver.compile import kernel, stopped
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.midpoint import left_out
-from brakecli.solver.motions import STAGES, V_X, V_Y, X, Y
-from brakecli.solver.records import DISTURBED, GRID, SPANS, Grid
+from brakecli.solver.kernels import kernel, stopped
+from brakecli.solver.motion.phases import OPEN, STICK, side_of
+from brakecli.solver.motion.record import V_X, V_Y, X, Y
+from brakecli.solver.motions import STAGES
+from brakecli.solver.plant import Plant
+from brakecli.solver.records import DISTURBED, SPANS
 from brakecli.solver.runge_kutta import END_STAGE
 from brakecli.solver.schemes.event_driven import phases
-from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
 
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (5, 3, 12)]
 POINTS = np.array([len(places) for places, _ in _RULES])
@@ -36,8 +38,8 @@ _MUCH = 0.3
 """Part of the pad that comes or goes in a step, from which on more places are looked at."""
 
 
-@kernel(void(SHOE, float64), inlined=False)
-def _ahead(p: Shoe, tau: float) -> None:
+@kernel(inline=False)
+def _ahead(p: Plant, tau: float) -> None:
     """Carry errors and disturbance by exp(A τ) e = Σ (A τ)^n e/n!, with the contact at the last place."""
     c = p.c
     m = p.motion
@@ -82,14 +84,14 @@ def _ahead(p: Shoe, tau: float) -> None:
         e[V_Y] = w
 
 
-@kernel(float64(float64))
+@kernel
 def _size(error: float) -> float:
     """Its absolute value; infinite where a motion has amplified it beyond all numbers."""
     return abs(error) if abs(error) < math.inf else math.inf
 
 
-@kernel(int64(SHOE, GRID))
-def _beyond(p: Shoe, grid: Grid) -> int:
+@kernel(inline=False)
+def _beyond(p: Plant, grid: Any) -> int:
     """1 where the error is more than the most; at first, when the motion is small, it says nothing."""
     m = p.motion
     t = p.tangent
@@ -104,8 +106,8 @@ def _beyond(p: Shoe, grid: Grid) -> int:
     return 0
 
 
-@kernel(void(SHOE, float64, GRID), inlined=False)
-def grow(p: Shoe, h: float, grid: Grid) -> None:
+@kernel(inline=False)
+def grow(p: Plant, tables: Floats, scratch: Floats, h: float, grid: Any) -> None:
     """Carry error and disturbance along the step that has been made, and add what the step makes of its own.
 
     At each place of Gauss's rule that is its share of u' - f(u), and of what the midpoint rule leaves out of F_y.
@@ -143,8 +145,8 @@ def grow(p: Shoe, h: float, grid: Grid) -> None:
         at_y, slope_y = runge_kutta.interpolated_both(m, Y, theta)
         at_v_x, slope_v_x = runge_kutta.interpolated_both(m, V_X, theta)
         at_v_y, slope_v_y = runge_kutta.interpolated_both(m, V_Y, theta)
-        phases.find_slopes(p, _AT, theta * step, at_x, at_y, at_v_x, at_v_y)
-        missing = left_out(at_y, p.layer) / c.m if p.layer.contact.kind == MIDPOINT else 0.0
+        phases.find_slopes(p, tables, scratch, _AT, theta * step, at_x, at_y, at_v_x, at_v_y)
+        missing = left_out(at_y, p.layer, tables, scratch) / c.m if p.layer.contact.kind == MIDPOINT else 0.0
         before = theta - begin
         _ahead(p, before * step)
         d_x = part * (slope_x / step - m.slopes[_AT, X])

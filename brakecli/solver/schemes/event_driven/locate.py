@@ -2,14 +2,14 @@
 
 import math
 
-from numba import float64, int64, types
-
-from brakecli.solver.automaton import HEIGHT, OPEN, SOONER, STICK, side_of
-from brakecli.solver.compile import kernel
+from brakecli.solver.arrays import Floats
 from brakecli.solver.double_double import ROUNDING
-from brakecli.solver.motions import V_X, Y
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion.phases import HEIGHT, OPEN, SOONER, STICK, side_of
+from brakecli.solver.motion.record import V_X, Y
+from brakecli.solver.plant import Plant
 from brakecli.solver.runge_kutta import reach
-from brakecli.solver.schemes.event_driven.phases import NEAR, SHOE, Shoe, margins, rounding
+from brakecli.solver.schemes.event_driven.phases import NEAR, margins, rounding
 
 NONE = -1
 LOOKS = 8
@@ -33,8 +33,8 @@ _FALLS = 7.0
 rise² / (8 bend), and 8 (1 - 1/8) = 7."""
 
 
-@kernel(types.UniTuple(float64, 3)(SHOE))
-def _allowances(p: Shoe) -> tuple[float, float, float]:
+@kernel
+def _allowances(p: Plant) -> tuple[float, float, float]:
     """How far each margin may be below zero by rounding alone."""
     m = p.motion
     height = ROUNDING * (abs(m.y) + p.layer.pad.clear_from)
@@ -45,14 +45,14 @@ def _allowances(p: Shoe) -> tuple[float, float, float]:
     return height, 2.0 * along, 2.0 * along
 
 
-@kernel(float64(SHOE, int64, float64, float64, float64), inlined=False)
-def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
+@kernel(inline=False)
+def _root(p: Plant, tables: Floats, scratch: Floats, which: int, h: float, left: float, right: float) -> float:
     """Where a margin passes zero between left and right: the secant inside the bracket, halved if it lags.
 
     Near enough for Newton's iteration on the true motion to make it exact.
     """
-    low = margins(p, h, left)[which]
-    high = margins(p, h, right)[which]
+    low = margins(p, tables, scratch, h, left)[which]
+    high = margins(p, tables, scratch, h, right)[which]
     if low <= 0.0:
         return left
     place = left
@@ -64,7 +64,7 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
         if abs(new - place) <= _NEAR * right or right - left <= _NEAR * right:
             return new
         place = new
-        value = margins(p, h, place)[which]
+        value = margins(p, tables, scratch, h, place)[which]
         if value > 0.0:
             left = place
             low = value
@@ -80,13 +80,15 @@ def _root(p: Shoe, which: int, h: float, left: float, right: float) -> float:
     return right
 
 
-@kernel(types.UniTuple(float64, 2)(SHOE, int64, float64, float64, float64), inlined=False)
-def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[float, float]:
+@kernel(inline=False)
+def lowest(
+    p: Plant, tables: Floats, scratch: Floats, which: int, h: float, left: float, right: float
+) -> tuple[float, float]:
     """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
     a = left + _GOLDEN * (right - left)
     b = right - _GOLDEN * (right - left)
-    at_a = margins(p, h, a)[which]
-    at_b = margins(p, h, b)[which]
+    at_a = margins(p, tables, scratch, h, a)[which]
+    at_b = margins(p, tables, scratch, h, b)[which]
     for _ in range(_GOLDEN_STEPS):
         if at_a < 0.0 or at_b < 0.0:
             break
@@ -95,32 +97,32 @@ def lowest(p: Shoe, which: int, h: float, left: float, right: float) -> tuple[fl
             b = a
             at_b = at_a
             a = left + _GOLDEN * (right - left)
-            at_a = margins(p, h, a)[which]
+            at_a = margins(p, tables, scratch, h, a)[which]
         else:
             left = a
             a = b
             at_a = at_b
             b = right - _GOLDEN * (right - left)
-            at_b = margins(p, h, b)[which]
+            at_b = margins(p, tables, scratch, h, b)[which]
     return (a, at_a) if at_a < at_b else (b, at_b)
 
 
-@kernel(float64(SHOE, int64, float64, float64), inlined=False)
-def _depth(p: Shoe, which: int, h: float, root: float) -> float:
+@kernel(inline=False)
+def _depth(p: Plant, tables: Floats, scratch: Floats, which: int, h: float, root: float) -> float:
     """How far below zero a margin would fall behind its root, if the phase went on: by a parabola; or infinity.
 
     With m_1 and m_2 at one and two distances before the root that is (2 m_1 - m_2/2)²/2(m_2 - 2 m_1).
     """
     apart = 0.5 * min(root, 2.0 * _APART)
-    one = margins(p, h, root - apart)[which]
-    two = margins(p, h, root - 2.0 * apart)[which]
+    one = margins(p, tables, scratch, h, root - apart)[which]
+    two = margins(p, tables, scratch, h, root - 2.0 * apart)[which]
     fall = 2.0 * one - 0.5 * two
     bend = two - 2.0 * one
     return 0.5 * fall * fall / bend if bend > 0.0 else math.inf
 
 
-@kernel(types.Tuple((int64, float64))(SHOE, float64), inlined=False)
-def first_event(p: Shoe, h: float) -> tuple[int, float]:
+@kernel(inline=False)
+def first_event(p: Plant, tables: Floats, scratch: Floats, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
 
     None does where the continuous solution cannot get that far from the begin of the step. A margin may also dip
@@ -137,12 +139,12 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
     if stays and (m.phase == OPEN or (m.phase != STICK and sliding > far)):
         return NONE, 1.0
     allowed = _allowances(p)
-    before_last = last = margins(p, h, 0.0)
+    before_last = last = margins(p, tables, scratch, h, 0.0)
     for look in range(1, LOOKS + 1):
         theta = look / LOOKS
         found = NONE
         first = math.inf
-        now = margins(p, h, theta)
+        now = margins(p, tables, scratch, h, theta)
         for which in range(3):
             left = (look - 1) / LOOKS
             right = 0.0
@@ -156,12 +158,12 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                     left = theta
                     for _ in range(_SOUGHT):
                         left *= SOONER
-                        if margins(p, h, left)[which] > allowed[which]:
+                        if margins(p, tables, scratch, h, left)[which] > allowed[which]:
                             break
                     else:
                         return which, 0.0
             elif look == 1 and allowed[which] < last[which] <= now[which]:
-                dip = 0.0 if margins(p, h, _BESIDE)[which] < last[which] else -1.0
+                dip = 0.0 if margins(p, tables, scratch, h, _BESIDE)[which] < last[which] else -1.0
                 until = theta
             elif before_last[which] > last[which] <= now[which] and rise * rise > _FALLS * bend * (
                 last[which] - near
@@ -169,23 +171,23 @@ def first_event(p: Shoe, h: float) -> tuple[int, float]:
                 dip = theta - 2.0 / LOOKS
                 until = theta
             if right == 0.0 and dip < 0.0 and look == LOOKS and now[which] <= last[which]:
-                dip = left if margins(p, h, 1.0 - _BESIDE)[which] < now[which] else -1.0
+                dip = left if margins(p, tables, scratch, h, 1.0 - _BESIDE)[which] < now[which] else -1.0
                 until = theta
             if dip >= 0.0:
-                place, value = lowest(p, which, h, dip, until)
+                place, value = lowest(p, tables, scratch, which, h, dip, until)
                 if value < -allowed[which]:
                     left = dip
                     right = place
                 elif which != HEIGHT:
                     m.lowest = min(m.lowest, value)
             if right > 0.0:
-                root = _root(p, which, h, left, right)
+                root = _root(p, tables, scratch, which, h, left, right)
                 if root < first:
                     found = which
                     first = root
         if found != NONE:
             if found != HEIGHT:
-                m.lowest = min(m.lowest, _depth(p, found, h, first))
+                m.lowest = min(m.lowest, _depth(p, tables, scratch, found, h, first))
             return found, first
         before_last = last
         last = now

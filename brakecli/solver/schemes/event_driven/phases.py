@@ -6,12 +6,16 @@ the control of the step finds them.
 """
 
 import math
-from typing import Any, NamedTuple
 
-from numba import float64, int64, types, void
-
-from brakecli.solver import records
-from brakecli.solver.automaton import (
+from brakecli.solver.arrays import Floats
+from brakecli.solver.coefficients import Coefficients
+from brakecli.solver.contact import CLOSED_FORM, EVALUATORS
+from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
+from brakecli.solver.contact.force import evaluate
+from brakecli.solver.contact.midpoint import press as press_nodes
+from brakecli.solver.double_double import ROUNDING
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion.phases import (
     HEIGHT,
     OPEN,
     PULL,
@@ -23,13 +27,8 @@ from brakecli.solver.automaton import (
     held,
     side_of,
 )
-from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.compile import at_address, kernel
-from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
-from brakecli.solver.double_double import ROUNDING
-from brakecli.solver.motions import MOTION_TYPE, V_X, V_Y, X, Y
-from brakecli.solver.records import COEFFICIENTS, Drive, Layer
+from brakecli.solver.motion.record import V_X, V_Y, X, Y
+from brakecli.solver.plant import Plant
 from brakecli.solver.roughness import turn
 from brakecli.solver.runge_kutta import END_STAGE, interpolated
 from brakecli.solver.schedules import integral_at, slope_at, value_at
@@ -39,26 +38,10 @@ NEAR = 3.0
 """Times what the error moves a margin by: one that comes nearer to zero may be an event, or none."""
 
 
-class Shoe(NamedTuple):
-    """Everything that a step of an event-driven motion works with: what is given, then the records it changes."""
-
-    c: Coefficients
-    layer: Layer
-    motion: Any
-    work: Any
-    counts: Any
-    tangent: Any
-    track: Any
+_ON_NODES = list(EVALUATORS).index("midpoint")
 
 
-_CHANGED = [MOTION_TYPE, records.WORK_TYPE, records.COUNTS_TYPE, records.TANGENT_TYPE, records.TRACK_TYPE]
-SHOE = types.NamedTuple([COEFFICIENTS, records.LAYER, *_CHANGED], Shoe)
-_evaluate_at = at_address(records.EVALUATE)
-_PAIR = types.UniTuple(float64, 2)
-_TRIPLE = types.UniTuple(float64, 3)
-
-
-@kernel(_PAIR(COEFFICIENTS, float64, float64, float64, float64, float64))
+@kernel
 def resistance(c: Coefficients, load: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
     """Forces of links and load against x and y, (6) and (7): what friction and normal force work against."""
     return (
@@ -67,8 +50,8 @@ def resistance(c: Coefficients, load: float, x: float, y: float, v_x: float, v_y
     )
 
 
-@kernel(_PAIR(SHOE), inlined=False)
-def rounding(p: Shoe) -> tuple[float, float]:
+@kernel(inline=False)
+def rounding(p: Plant) -> tuple[float, float]:
     """Rounding in the tangential and in the normal balance of forces, N: 4 ε times the sizes of their terms."""
     c = p.c
     pad = p.layer.pad
@@ -87,28 +70,28 @@ def rounding(p: Shoe) -> tuple[float, float]:
     return ROUNDING * along, ROUNDING * (across + normal)
 
 
-@kernel(void(SHOE, records.DRIVE), inlined=False)
-def arrive(p: Shoe, drive: Drive) -> None:
+@kernel(inline=False)
+def arrive(p: Plant, tables: Floats, scratch: Floats) -> None:
     """What acts from outside at the time reached and, as no knot lies inside a step, all through the next step."""
     m = p.motion
     t = p.motion.time
     tau = p.motion.tau
     after = t + tau + ROUNDING * (t + tau)  # a knot within the rounding of the time has been reached
-    m.belt = value_at(drive.belt, t + tau)
-    m.belt_slope = slope_at(drive.belt, after)
-    m.load = value_at(drive.load, t + tau)
-    m.load_slope = slope_at(drive.load, after)
-    m.travel, m.travel_low = integral_at(drive.belt, t, tau)
+    m.belt = value_at(scratch[p.drive.belt_at : p.drive.belt_end], t + tau)
+    m.belt_slope = slope_at(scratch[p.drive.belt_at : p.drive.belt_end], after)
+    m.load = value_at(scratch[p.drive.load_at : p.drive.load_end], t + tau)
+    m.load_slope = slope_at(scratch[p.drive.load_at : p.drive.load_end], after)
+    m.travel, m.travel_low = integral_at(scratch[p.drive.belt_at : p.drive.belt_end], t, tau)
     if p.layer.pad.wheel_terms > 0:
-        turn(m.travel, m.travel_low, p.layer)
+        turn(m.travel, m.travel_low, p.layer, tables, scratch)
     m.pressed_x = math.nan
     if m.started != 0 and m.phase == STICK:
         m.x = carried(m.anchor, m.anchor_low, m.travel, m.travel_low)
         m.v_x = m.belt
 
 
-@kernel(float64(SHOE, float64, float64, int64))
-def press(p: Shoe, x: float, y: float, phase: int) -> float:
+@kernel(inline=False)
+def press(p: Plant, tables: Floats, scratch: Floats, x: float, y: float, phase: int) -> float:
     """F_y (N) in the phase and the rest of `contact`; the closed form while a bound proves full contact.
 
     x is less what the wheel has travelled since the time that `angles` belong to.
@@ -133,11 +116,14 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
     m = p.motion
     light = m.light == 1
     if not full or p.layer.window.rows > 0:
-        _evaluate_at(p.layer.press if light else p.layer.evaluate)(x, y, p.layer)
+        if light and p.layer.evaluator == _ON_NODES:
+            press_nodes(x, y, p.layer, tables, scratch)
+        else:
+            evaluate(x, y, p.layer, tables, scratch)
         if full:  # the sum over nodes is the closed form
             contact.kind = CLOSED_FORM
     elif not light:
-        full_contact(x, y, p.layer)
+        full_contact(x, y, p.layer, tables, scratch)
     elif x == m.pressed_x:  # in stick; the force is linear in y
         contact.stiffness = 2.0 * pad.half_length * pad.k
         contact.fraction = 1.0
@@ -145,15 +131,17 @@ def press(p: Shoe, x: float, y: float, phase: int) -> float:
         contact.kind = CLOSED_FORM
         contact.valid = 1
     else:
-        full_press(x, y, p.layer)
+        full_press(x, y, p.layer, tables, scratch)
         m.pressed_x = x
         m.pressed_y = y
         m.pressed = contact.normal_force
     return contact.normal_force  # type: ignore[no-any-return]
 
 
-@kernel(void(SHOE, int64, float64, float64, float64, float64, float64))
-def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: float, v_y: float) -> None:
+@kernel(inline=False)
+def find_slopes(
+    p: Plant, tables: Floats, scratch: Floats, stage: int, since: float, x: float, y: float, v_x: float, v_y: float
+) -> None:
     """(6)-(7) as equations of first order, and the powers of the energy account, `since` the begin of the step.
 
     The powers are F_x U, -F_x (ẋ - U), ẋ b_xx ẋ + 2 ẋ b_xy ẏ + ẏ b_yy ẏ, Q_x ẋ + Q_y ẏ, and that of the roughness.
@@ -171,7 +159,7 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
         at = m.x
         x = m.x + travel
         v_x = belt
-    normal = press(p, at, y, m.phase)
+    normal = press(p, tables, scratch, at, y, m.phase)
     against_x, against_y = resistance(c, load, x, y, v_x, v_y)
     friction = c.m * m.belt_slope + against_x if stuck else -side * c.phi * normal  # Eq. (4), Eq. (5)
     sliding = v_x - belt
@@ -190,8 +178,8 @@ def find_slopes(p: Shoe, stage: int, since: float, x: float, y: float, v_x: floa
     m.work_rates[stage, 4] = p.layer.contact.store_x * sliding if m.light == 0 else normal * v_y
 
 
-@kernel(_TRIPLE(SHOE, float64, float64), inlined=False)
-def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
+@kernel(inline=False)
+def margins(p: Plant, tables: Floats, scratch: Floats, h: float, theta: float) -> tuple[float, float, float]:
     """The margins of the phase at the part theta of the step h; one that the phase does not have is 1.
 
     In flight y - clear; otherwise clear - y, in slip side (ẋ - U), in stick φ F_y - needed and φ F_y + needed.
@@ -207,15 +195,15 @@ def margins(p: Shoe, h: float, theta: float) -> tuple[float, float, float]:
     if m.phase != STICK:
         return height, side_of(m.phase) * (interpolated(m, V_X, theta) - belt), 1.0
     x = m.x + (m.belt + 0.5 * m.belt_slope * since) * since
-    bound = c.phi * press(p, m.x, y, m.phase)
+    bound = c.phi * press(p, tables, scratch, m.x, y, m.phase)
     v_y = interpolated(m, V_Y, theta)
     against_x, _ = resistance(c, m.load + m.load_slope * since, x, y, belt, v_y)
     needed = c.m * m.belt_slope + against_x
     return height, bound - needed, bound + needed
 
 
-@kernel(float64(SHOE, int64), inlined=False)
-def margin_slope(p: Shoe, which: int) -> float:
+@kernel(inline=False)
+def margin_slope(p: Plant, which: int) -> float:
     """Rate of a margin at the end of a step, from the slopes and the contact there."""
     c = p.c
     m = p.motion
@@ -232,8 +220,8 @@ def margin_slope(p: Shoe, which: int) -> float:
     return bound - needed if which == PULL else bound + needed  # type: ignore[no-any-return]
 
 
-@kernel(_PAIR(SHOE, *[float64] * 5), inlined=False)
-def cone(p: Shoe, since: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
+@kernel(inline=False)
+def cone(p: Plant, since: float, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
     """How far the force that stick takes is within the friction cone (N), and what the error moves that by.
 
     φ F_y - |needed|, and |δ needed| + φ |∂F_y/∂x δx + ∂F_y/∂y δy|.
@@ -251,15 +239,15 @@ def cone(p: Shoe, since: float, x: float, y: float, v_x: float, v_y: float) -> t
     return within, abs(more) + c.phi * abs(pressed)
 
 
-@kernel(void(SHOE), inlined=False)
-def take_hold(p: Shoe) -> None:
+@kernel(inline=False)
+def take_hold(p: Plant, tables: Floats, scratch: Floats) -> None:
     """The phase of a touching shoe that moves with the wheel: stick if friction can hold it, Eqs. (3)-(5).
 
     A shoe that slips on keeps its velocity: the wheel's is as uncertain as the time, however fast it changes.
     """
     c = p.c
     m = p.motion
-    bound = c.phi * press(p, m.x, m.y, STICK)
+    bound = c.phi * press(p, tables, scratch, m.x, m.y, STICK)
     against_x, _ = resistance(c, m.load, m.x, m.y, m.belt, m.v_y)
     needed = c.m * m.belt_slope + against_x
     along, _ = rounding(p)
@@ -276,8 +264,8 @@ def take_hold(p: Shoe) -> None:
         m.v_x = m.belt
 
 
-@kernel(void(SHOE, int64), inlined=False)
-def switch(p: Shoe, which: int) -> None:
+@kernel(inline=False)
+def switch(p: Plant, tables: Floats, scratch: Floats, which: int) -> None:
     """Enter the phase that follows where a margin has run out."""
     m = p.motion
     p.tangent.moved = math.inf
@@ -285,5 +273,5 @@ def switch(p: Shoe, which: int) -> None:
         m.y = p.layer.pad.clear_from  # 0 on smooth surfaces, as it must be
     m.phase = following(m.phase, which, m.v_x - m.belt)
     if m.phase == UNDECIDED:
-        take_hold(p)
-    find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
+        take_hold(p, tables, scratch)
+    find_slopes(p, tables, scratch, 0, 0.0, m.x, m.y, m.v_x, m.v_y)

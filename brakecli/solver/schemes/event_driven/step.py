@@ -3,22 +3,21 @@
 import math
 from typing import Any
 
-from numba import float64, int64, void
-
 from brakecli.solver import runge_kutta
-from brakecli.solver.automaton import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
-from brakecli.solver.compile import kernel
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import EPSILON, ROUNDING
-from brakecli.solver.motions import MOTION_TYPE, POWERED, STAGES, V_X, V_Y, X, Y
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion.phases import OPEN, STICK, UNDECIDED, counted, sliding_phase, stalled
+from brakecli.solver.motion.record import V_X, V_Y, X, Y
+from brakecli.solver.motions import POWERED, STAGES
+from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND, Failure
-from brakecli.solver.records import DRIVE, GRID, KNOTS, Drive, Grid
 from brakecli.solver.runge_kutta import END_STAGE, NODES, ORDER, USED, A
-from brakecli.solver.schedules import Schedule, segment
+from brakecli.solver.schedules import KNOT, TIME, Schedule, segment
 from brakecli.solver.schemes.event_driven import phases
 from brakecli.solver.schemes.event_driven.error import grow
 from brakecli.solver.schemes.event_driven.locate import NONE, first_event
-from brakecli.solver.schemes.event_driven.phases import SHOE, Shoe
 from brakecli.solver.track import enter, put, turned
 
 _LOCAL = 0.05
@@ -55,21 +54,19 @@ _AGAIN = 8
 """Steps that are made to where an event is, at most."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
-STEP = int64(SHOE, DRIVE, GRID)
-
 _NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
 _NOT_CLOSED = int(Failure.NOT_CLOSED)
 
 
-@kernel(float64(KNOTS, float64))
+@kernel
 def _to_knot(s: Schedule, t: float) -> float:
     """Time (s) to the next knot of a schedule; one within the rounding of t has been reached."""
     k = segment(s, t + ROUNDING * abs(t)) + 1
-    return s[k].time - t if k < s.size else math.inf
+    return s[KNOT * k + TIME] - t if k < s.size // KNOT else math.inf
 
 
-@kernel(float64(SHOE, float64))
-def _longest(p: Shoe, duration: float) -> float:
+@kernel
+def _longest(p: Plant, duration: float) -> float:
     """The longest step (s), by the fastest motion and the passing waves; `duration` where nothing limits it.
 
     2 rad over its bound of the angular frequency, √(stiffness/m), 4 over its bound of the decay rate, (b_xx +
@@ -95,25 +92,25 @@ def _longest(p: Shoe, duration: float) -> float:
     return longest
 
 
-@kernel(void(SHOE, DRIVE, GRID), inlined=False)
-def first_step(p: Shoe, drive: Drive, grid: Grid) -> None:
+@kernel(inline=False)
+def first_step(p: Plant, tables: Floats, scratch: Floats, grid: Any) -> None:
     """Find the phase of the initial state, and a step to begin with."""
     m = p.motion
     m.tolerance = _LOCAL * grid.tolerance
     m.light = 1 if p.layer.pad.nodes > 0 else 0
     m.pair = 1 if m.light == 1 and grid.tolerance >= _LOOSE else 0
-    phases.arrive(p, drive)
+    phases.arrive(p, tables, scratch)
     m.largest[X], m.largest[Y], m.largest[V_X], m.largest[V_Y] = abs(m.x), abs(m.y), abs(m.v_x), abs(m.v_y)
     height = m.y - p.layer.pad.clear_from
     m.phase = OPEN if height > 0.0 or (height == 0.0 and m.v_y > 0.0) else sliding_phase(m.v_x - m.belt)
     if m.phase == UNDECIDED:
-        phases.take_hold(p)
-    phases.find_slopes(p, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
+        phases.take_hold(p, tables, scratch)
+    phases.find_slopes(p, tables, scratch, 0, 0.0, m.x, m.y, m.v_x, m.v_y)
     m.step = (_FIRST if m.light == 0 else _FIRST_ON_NODES) * _longest(p, grid.samples * grid.interval)
 
 
-@kernel(float64(SHOE, float64), inlined=False)
-def _defect(p: Shoe, h: float) -> float:
+@kernel(inline=False)
+def _defect(p: Plant, tables: Floats, scratch: Floats, h: float) -> float:
     """By how much the continuous solution misses (6)-(7) inside a step, over what the tolerance leaves it.
 
     It is |du/dθ - h f(u)|. The error estimate is a linear functional of the slopes, which vanishes for a kink at
@@ -127,7 +124,7 @@ def _defect(p: Shoe, h: float) -> float:
         y = runge_kutta.interpolated(m, Y, theta)
         v_x = runge_kutta.interpolated(m, V_X, theta)
         v_y = runge_kutta.interpolated(m, V_Y, theta)
-        phases.find_slopes(p, STAGES - 1, theta * h, x, y, v_x, v_y)
+        phases.find_slopes(p, tables, scratch, STAGES - 1, theta * h, x, y, v_x, v_y)
         for i in (V_X, V_Y):
             if m.phase == STICK and i == V_X:
                 continue
@@ -138,8 +135,8 @@ def _defect(p: Shoe, h: float) -> float:
     return worst
 
 
-@kernel(float64(SHOE, float64, float64), inlined=False)
-def _try(p: Shoe, h: float, allowed: float) -> float:
+@kernel(inline=False)
+def _try(p: Plant, tables: Floats, scratch: Floats, h: float, allowed: float) -> float:
     """Make the stages of a step, its end and, if its error is allowed, its continuous solution; the error.
 
     The error is that of the worst component over what the tolerance and rounding leave it.
@@ -174,7 +171,7 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
         y = m.begin[Y] + h * y
         v_x = m.begin[V_X] + h * v_x
         v_y = m.begin[V_Y] + h * v_y
-        phases.find_slopes(p, stage, NODES[m.pair, stage] * h, x, y, v_x, v_y)
+        phases.find_slopes(p, tables, scratch, stage, NODES[m.pair, stage] * h, x, y, v_x, v_y)
         if stage == END_STAGE:
             m.end[X] = x
             m.end[Y] = y
@@ -184,11 +181,11 @@ def _try(p: Shoe, h: float, allowed: float) -> float:
                 return math.inf
     runge_kutta.make_continuous(m, h)
     m.step_done = h
-    return worst if p.layer.contact.kind == CLOSED_FORM else max(worst, _defect(p, h))
+    return worst if p.layer.contact.kind == CLOSED_FORM else max(worst, _defect(p, tables, scratch, h))
 
 
-@kernel(float64(SHOE, int64, float64), inlined=False)
-def _to_event(p: Shoe, which: int, h: float) -> float:
+@kernel(inline=False)
+def _to_event(p: Plant, tables: Floats, scratch: Floats, which: int, h: float) -> float:
     """Make the step that ends at an event, located to rounding; its length, or 0 where the contact is not closed.
 
     A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact.
@@ -197,9 +194,9 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
     m = p.motion
     longest = p.motion.step_done
     for _ in range(_AGAIN):
-        if _try(p, h, math.inf) == math.inf:
+        if _try(p, tables, scratch, h, math.inf) == math.inf:
             return 0.0
-        margin = phases.margins(p, h, 1.0)[which]
+        margin = phases.margins(p, tables, scratch, h, 1.0)[which]
         slope = phases.margin_slope(p, which)
         rest = -margin / slope if slope != 0.0 else 0.0
         if abs(rest) <= _NEAR * h:
@@ -212,7 +209,7 @@ def _to_event(p: Shoe, which: int, h: float) -> float:
     return m.step_done  # type: ignore[no-any-return]
 
 
-@kernel(float64(MOTION_TYPE, int64))
+@kernel
 def _passed(m: Any, item: int) -> float:
     """A work of the step that has been made, over its length: Σ A_end,s P_s over the powers at its stages."""
     total = 0.0
@@ -221,8 +218,8 @@ def _passed(m: Any, item: int) -> float:
     return total
 
 
-@kernel(void(SHOE), inlined=False)
-def _meet(p: Shoe) -> None:
+@kernel(inline=False)
+def _meet(p: Plant) -> None:
     """Note where in the step that has been made a rough pad comes to the wheel or leaves it.
 
     A contact that vanishes has a force that grows with its age to the power 3/2, so that its age is 3/2 F/|dF/dt|.
@@ -261,8 +258,8 @@ def _meet(p: Shoe) -> None:
     )
 
 
-@kernel(void(SHOE), inlined=False)
-def _follow(p: Shoe) -> None:
+@kernel(inline=False)
+def _follow(p: Plant) -> None:
     """Note a turning point on the continuous solution of the step that has been made, and what the pad does."""
     m = p.motion
     track = p.track
@@ -282,14 +279,14 @@ def _follow(p: Shoe) -> None:
         _meet(p)
 
 
-@kernel(void(SHOE, DRIVE, GRID, float64, int64))
-def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
+@kernel(inline=False)
+def _take(p: Plant, tables: Floats, scratch: Floats, grid: Any, h: float, last: int) -> None:
     """Take the step that has been made; `last` is 1 where it reaches the end of the run."""
     m = p.motion
     work = p.work
     interval = grid.interval
     if p.tangent.on == 1 or p.tangent.knows == 1:
-        grow(p, h, grid)
+        grow(p, tables, scratch, h, grid)
     if p.track.on == 1:
         _follow(p)
     m.time_done = m.time
@@ -323,16 +320,18 @@ def _take(p: Shoe, drive: Drive, grid: Grid, h: float, last: int) -> None:
         m.level = grid.samples
         m.tau = 0.0
     m.time = interval * m.level
-    phases.arrive(p, drive)
+    phases.arrive(p, tables, scratch)
+    if m.belt_slope != m.belt_slope_done or m.load_slope != m.load_slope_done:
+        phases.find_slopes(p, tables, scratch, 0, 0.0, m.x, m.y, m.v_x, m.v_y)  # what stick takes jumps at a knot
     m.switches = 0
     p.counts.kinds[p.layer.contact.kind] += 1
 
 
-@kernel(int64(SHOE, int64, float64))
-def _enter(p: Shoe, which: int, longest: float) -> int:
+@kernel(inline=False)
+def _enter(p: Plant, tables: Floats, scratch: Floats, which: int, longest: float) -> int:
     """Enter the phase after an event, and see that events do not pile up without progress; a `Failure`."""
     m = p.motion
-    phases.switch(p, which)
+    phases.switch(p, tables, scratch, which)
     if p.track.on == 1:
         phase = m.phase if m.touch[0, 0] > 0.0 else OPEN
         enter(p.track, phase, m.time + m.tau, m.x, m.y, m.v_x, m.v_y)
@@ -340,15 +339,19 @@ def _enter(p: Shoe, which: int, longest: float) -> int:
     return _STALLED if stalled(m.events) else _NONE
 
 
-@kernel(STEP, inlined=False)
-def step(p: Shoe, drive: Drive, grid: Grid) -> int:
+@kernel(inline=False)
+def step(p: Plant, tables: Floats, scratch: Floats, grid: Any) -> int:
     """Take one step, up to an event at most; a `Failure`."""
     m = p.motion
     evaluations = p.counts.evaluations
     t = m.time + m.tau
     to_end = (grid.samples - m.level) * grid.interval - m.tau
     longest = _longest(p, grid.samples * grid.interval)
-    limit = min(longest, _to_knot(drive.belt, t), _to_knot(drive.load, t))
+    limit = min(
+        longest,
+        _to_knot(scratch[p.drive.belt_at : p.drive.belt_end], t),
+        _to_knot(scratch[p.drive.load_at : p.drive.load_end], t),
+    )
     last = 1 if to_end <= limit else 0
     limit = min(limit, to_end)
     h = min(m.step, limit)
@@ -356,7 +359,7 @@ def step(p: Shoe, drive: Drive, grid: Grid) -> int:
     while True:
         if h < limit:
             last = 0
-        error = _try(p, h, 1.0)
+        error = _try(p, tables, scratch, h, 1.0)
         factor = max(_LEAST, min(growth, _SAFETY * error ** (-1.0 / ORDER[m.pair]))) if error > 0.0 else growth
         if error <= 1.0:
             break
@@ -365,21 +368,21 @@ def step(p: Shoe, drive: Drive, grid: Grid) -> int:
         if not h > EPSILON * longest or m.tau + h == m.tau:
             return _STALLED if p.layer.contact.valid == 1 else _NOT_CLOSED
     m.step = max(h * factor, m.step if h == limit else 0.0)
-    which, theta = first_event(p, h)
+    which, theta = first_event(p, tables, scratch, h)
     if which != NONE and theta == 0.0:
         m.switches += 1
         if m.switches > _MANY_SWITCHES:
             m.step = _CLOSER * h
         if m.switches > _MOST_SWITCHES:
             return _STALLED
-        return _enter(p, which, longest)
+        return _enter(p, tables, scratch, which, longest)
     if which != NONE:
-        h = _to_event(p, which, theta * h)
+        h = _to_event(p, tables, scratch, which, theta * h)
         last = 0
         if h == 0.0:
             return _NOT_CLOSED
-    _take(p, drive, grid, h, last)
+    _take(p, tables, scratch, grid, h, last)
     p.counts.most = max(p.counts.most, p.counts.evaluations - evaluations)
     if not abs(m.x) + abs(m.y) + abs(m.v_x) + abs(m.v_y) < BOUND:
         return _DIVERGED
-    return _enter(p, which, longest) if which != NONE else _NONE
+    return _enter(p, tables, scratch, which, longest) if which != NONE else _NONE

@@ -1,50 +1,52 @@
-"""The flow on rough pads, with its derivative: a Runge-Kutta method with a fixed number of steps.
+"""The flow on rough pads as Python sees it: a fixed number of steps, with the derivative beside it.
 
 The number of steps does not depend on the state, so the end is a smooth function of the state, of the span and of
 the parameters, as long as the sequence of phases is the same.
 
-**Contact.** The pad is cut into cells of equal length, and the gap f2 - f1 - y is a straight line in each of
+The pad is cut into cells of equal length, and the gap f2 - f1 - y is a straight line in each of
 them. The force (2), its derivatives by x and y and the length that touches are then closed forms, and the force is
 continuously differentiable. The heights at the nodes are those of the surfaces times tan(ωc/2) / (ωc/2) for a cell
 of length c. With this factor the force of a pad that touches everywhere is exact. In partial contact the cells in
 which contact begins or ends have an error of order c³, which cancels on average as the edge passes through a
 cell. The end of a flow has an error of order c⁴. A wave is even or odd about the middle of the pad, so tables of
 one half are enough.
-
-**Events.** A phase ends where a margin becomes zero: in slip the sliding speed, in stick how far the friction that
-is needed lies within the friction cone. The event is located inside the step and divides it into two parts.
-Lift-off is no event, because the normal force is continuous. A margin that dips below zero and returns within one
-step is found by the cubic through its values and slopes.
-
-**Derivative.** Columns hold the derivatives of x, y, v_x and v_y by each component of the first state. They obey
-the variational equations, and their steps are the derivatives of the steps of the state. At an event the length p
-of a part of a step depends on the state: margin(z(p)) = 0 gives dp = -dm / (∂m/∂p). The disturbed motion then has
-dz + (∂z/∂p) dp, and reaches the event later by dp. The next part begins later by dp and is shorter by dp. For
-short steps this is the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth
-Mechanical Systems, Springer 2004, ch. 7). Here it is the exact derivative of the computed flow, whatever the step
-is.
 """
 
 import math
 from dataclasses import dataclass
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
 
 from brakecli import stop
-from brakecli.solver.compile import LARGEST, Floats
+from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import aligned
 from brakecli.solver.double_double import two_product
-from brakecli.solver.flow.rough.events import fly, hold
-from brakecli.solver.flow.rough.record import EIGHT, FOUR, ROUGH
-from brakecli.solver.flow.rough.record import Status as Status
-from brakecli.solver.records import Parts, new
+from brakecli.solver.motion import advance as ends
+from brakecli.solver.motion.cells import EIGHT, FOUR
+from brakecli.solver.motion.phases import STICK
+from brakecli.solver.motion.record import BELT, LOAD
+from brakecli.solver.motion.tasks import FLY, advance
+from brakecli.solver.plant import PLANT
+from brakecli.solver.records import COEFFICIENTS, filled, one
 from brakecli.solver.roughness import Surface, wheel_angles
 from brakecli.solver.system import System
 
 CELLS_PER_WAVE = 24
 LEAST_CELLS = 96
 STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passes
+
+
+class Status(IntEnum):
+    """How a flow ended."""
+
+    DONE = ends.DONE
+    TOO_MANY_EVENTS = ends.EVENTFUL
+    STALLED = ends.STALLED  # events do not end
+    NOT_FINITE = ends.LOST
+    GRAZED = ends.GRAZED  # a margin becomes zero without passing through it: the flow has no derivative
+    STOPPED = ends.INTERRUPTED
 
 
 @dataclass(frozen=True)
@@ -116,44 +118,50 @@ class RoughFlow:
             raise ValueError(f"{cells} cells are too few: two and more to each wave are needed")
         self.system = system
         self.cells = cells
-        self._flow, self._tables = _prepared(system, cells)
+        self._plants, self._tables = _prepared(system, cells)
+        self._plant = self._plants[0]
         n = system.wheel.g.size
-        at = int(self._flow["angles_at"])
+        at = int(self._plant.cells.angles_at)
         self._belt = system.belt_speed
         self._waves = system.wheel.waves
         self._angles = self._tables[at : at + n]
-        self._memory = np.zeros(LARGEST, np.int8)
-        self._address = self._memory.ctypes.data
-        hold(Parts(system.coefficients, self._flow, self._tables), self._address)
 
     def __call__(self, state: Floats, begin_time: float, span: float, steps: int, tangents: bool = True) -> Flown:
         """The flow from a state (x, y, v_x, v_y) at a time (s), over a span (s) in so many equal steps."""
-        f = self._flow
+        m = self._plant.block
+        r = self._plant.runge
         travel, travel_low = two_product(self._belt, begin_time)
         wheel_angles(self._waves, travel, travel_low, self._angles)
-        f["z"] = state
-        f["tangents"] = int(tangents)
-        status = Status(fly(self._address, span / steps, steps))
-        events = int(f["events"])
+        m.z[:4] = state
+        m.task = FLY
+        m.count = 4 if tangents else 0
+        m.seconds = span
+        r.steps = steps
+        status = Status(advance(self._plants, self._tables, _NO_SCRATCH, _NO_ROWS, _NO_ROWS, 0))
+        events = int(m.events)
         return Flown(
             status,
-            f["end"].copy(),
-            f["t_end"].copy() if tangents and status is Status.DONE else None,
-            f["rates"].copy(),
-            tuple(f["word"][: events + 1].tolist()),
-            tuple(f["times"][:events].tolist()),
-            (float(f["least_x"]), float(f["most_x"])),
-            (float(f["least_y"]), float(f["most_y"])),
+            m.z[:4].copy(),
+            m.columns.T.copy() if tangents and status is Status.DONE else None,
+            m.velocity.copy(),
+            tuple(m.word[: events + 1].tolist()),
+            tuple(m.times[:events].tolist()),
+            (float(m.low[0]), float(m.high[0])),
+            (float(m.low[1]), float(m.high[1])),
             Margins(
-                slide=float(f["least_slide"]),
-                hold=float(f["least_hold"]),
-                pass_by=float(f["least_pass"]),
-                contact=float(f["least_contact"]),
-                most_contact=float(f["most_contact"]),
-                open_share=float(f["open"]) / span,
-                stick_share=float(f["stuck"]) / span,
+                slide=float(r.least_slide),
+                hold=float(r.least_hold),
+                pass_by=float(r.least_pass),
+                contact=float(r.least_contact),
+                most_contact=float(r.most_contact),
+                open_share=float(r.open) / span,
+                stick_share=float(m.spent[STICK]) / span,
             ),
         )
+
+
+_NO_SCRATCH = np.zeros(1)
+_NO_ROWS = np.zeros((1, 1))
 
 
 def _flattened(surface: Surface, cell: float) -> Floats:
@@ -164,8 +172,10 @@ def _flattened(surface: Surface, cell: float) -> Floats:
 
 
 def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
-    """The record of a flow, and its tables."""
-    f = new(ROUGH)
+    """An array of the record of a motion, and the tables of its pad."""
+    plants = one(PLANT)
+    plant = plants[0]
+    f = plant.cells
     wheel = system.wheel
     shoe = system.shoe
     a = system.half_length
@@ -204,14 +214,11 @@ def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
     table["waves_at"][:, 1] = np.cos(angle)
     steeper = np.divide(wheel.g, g, out=np.ones_like(g), where=g != 0.0)
     table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * steeper
-    f["belt"] = system.belt_speed
     f["stiffness"] = system.contact_stiffness
-    load = system.load_at_start
-    c = system.coefficients
-    f["pull_x"] = load * c.sin_beta
-    f["pull_y"] = load * c.cos_beta
+    plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
+    plant.block.z[BELT] = system.belt_speed
+    plant.block.z[LOAD] = system.load_at_start
     f["half"] = 0.5 * system.layer_stiffness * cell
-    f["cells"] = cells
     f["half_cells"] = half
     f["width"] = width
     f["waves"] = waves
@@ -221,4 +228,4 @@ def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
     f["full_up_to"] = -crest - nodes.max()
     f["clear_from"] = crest - nodes.min()
     f["signals"] = np.frombuffer(stop.memory, np.uint8).ctypes.data
-    return f, tables
+    return plants, tables

@@ -2,15 +2,13 @@
 
 A phase is a side of the friction law, stick or slip in one direction, on a pad that may touch the wheel; or it is
 flight, in which the pad is clear of the wheel. A margin is positive while the phase lasts, and the first one that
-runs out is the event that ends it. Two flows carry a motion through a phase and find that event: matrix
-exponentials on smooth surfaces (`schemes.piecewise_exact`), and Runge-Kutta steps on all surfaces
-(`schemes.event_driven`). Everything else that they do at an event stands here.
+runs out is the event that ends it. Two loops carry a motion through a phase and find that event: `motion.advance`,
+by matrix exponentials on smooth pads and by Runge-Kutta steps on rough ones of branches, and that of
+`schemes.event_driven` on any pads. What both of them do at an event stands here.
 """
 
-from numba import boolean, float64, int64, types
-
-from brakecli.solver.compile import kernel
 from brakecli.solver.double_double import two_sum
+from brakecli.solver.kernels import kernel
 
 BACKWARD, STICK, FORWARD, OPEN = range(4)
 """The phases: the sign of the sliding velocity plus one, and flight."""
@@ -33,13 +31,13 @@ _MOST_EVENTS = 1000
 _NO_PROGRESS = 1e-6
 
 
-@kernel(float64(int64))
+@kernel
 def side_of(phase: int) -> float:
     """The sign of the sliding velocity in a phase; 0 in stick, and in flight."""
     return float(phase - STICK) if phase != OPEN else 0.0
 
 
-@kernel(int64(float64))
+@kernel
 def sliding_phase(velocity: float) -> int:
     """The phase of a touching shoe with this sliding velocity; at 0 it is undecided."""
     if velocity == 0.0:
@@ -47,7 +45,7 @@ def sliding_phase(velocity: float) -> int:
     return FORWARD if velocity > 0.0 else BACKWARD
 
 
-@kernel(int64(float64, float64, float64, float64))
+@kernel
 def held(pull: float, push: float, pull_rounding: float, push_rounding: float) -> int:
     """The phase of a touching shoe at the wheel's velocity, by its margins in stick, Eqs. (3)-(5).
 
@@ -59,7 +57,7 @@ def held(pull: float, push: float, pull_rounding: float, push_rounding: float) -
     return FORWARD if push < -push_rounding else STICK
 
 
-@kernel(int64(int64, int64, float64))
+@kernel
 def following(phase: int, which: int, velocity: float) -> int:
     """The phase after a margin has run out at a sliding velocity (m/s); `UNDECIDED` where the forces decide."""
     if which == HEIGHT:
@@ -69,26 +67,26 @@ def following(phase: int, which: int, velocity: float) -> int:
     return UNDECIDED
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64, float64))
+@kernel
 def anchored(x: float, travel: float, travel_low: float) -> tuple[float, float]:
     """Where a shoe holds on to the wheel: x less what the wheel has travelled, as a sum of two doubles (m)."""
     anchor, low = two_sum(x, -travel)
     return anchor, low - travel_low
 
 
-@kernel(float64(float64, float64, float64, float64))
+@kernel
 def carried(anchor: float, anchor_low: float, travel: float, travel_low: float) -> float:
     """The place x (m) of a shoe in stick: its anchor plus what the wheel has travelled, without any drift."""
     return (anchor + travel) + (anchor_low + travel_low)
 
 
-@kernel(types.Tuple((float64, int64))(float64, int64, float64, float64))
+@kernel
 def counted(since: float, events: int, time: float, step: float) -> tuple[float, int]:
     """Since when events are counted, and how many there are, after one more: those within 1e-6 of a step."""
     return (time, 1) if time - since > _NO_PROGRESS * step else (since, events + 1)
 
 
-@kernel(boolean(int64))
+@kernel
 def stalled(events: int) -> bool:
     """Whether so many events came without progress that they will never end."""
     return events > _MOST_EVENTS

@@ -2,7 +2,7 @@
 
 import pytest
 
-from brakecli.solver.automaton import (
+from brakecli.solver.motion.phases import (
     BACKWARD,
     FORWARD,
     HEIGHT,

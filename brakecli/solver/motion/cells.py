@@ -3,16 +3,42 @@
 from typing import Any
 
 import numpy as np
-from numba import float64, int64, types, void
 
-from brakecli.solver.compile import FAST, Floats, kernel, vector
-from brakecli.solver.flow.rough.record import EIGHT, ROUGH_TYPE
+from brakecli.solver.arrays import Floats
+from brakecli.solver.kernels import FAST, kernel
+from brakecli.solver.records import record
 from brakecli.solver.sine import sine_cosine
 
+EIGHT = 8
+FOUR = 4
+"""Lanes of sines, and of nodes and waves in the tables."""
 _TINY = 1e-300  # avoids a division by zero where a cell is open
 
+CELLS = record(
+    "stiffness",  # 2ak, N/m
+    "half",  # k times half a cell, N/m
+    "shoe_mean",  # mean of f1 over the pad, m
+    "full_up_to clear_from",  # heights y: up to it all touches for sure, from it on nothing, m
+    "force slope touching",  # last contact: F_y (N), ∂F_y/∂x and -∂F_y/∂y (N/m)
+    "place",  # x - U since, for which sines and heights are known, m
+    half_cells=int,  # cells of half a pad
+    width=int,  # nodes of half a pad in the tables
+    waves=int,
+    known=int,  # of the place: 0 nothing, 1 sines, 2 heights, 3 also their slopes
+    signals=int,  # where to see that a signal has come, see `kernels.stopped`
+    omega_at=int,  # where in the tables begin: wavenumbers
+    g_at=int,  # amplitudes, with the factor of the cells
+    full_at=int,  # F_y of a full contact by the sine of each wave, N
+    angles_at=int,  # phases at the begin of the span
+    waves_at=int,  # sines and cosines of each wave at the nodes of half a pad
+    shoe_at=int,  # f1 at the nodes of the right half, and of the left half
+    sines_at=int,  # scratch: g sin and g cos of the angles, and these times ω
+    nodes_at=int,  # scratch: f2 at the nodes, the even part and the odd part, then of its slope
+)
+"""A rough pad in cells of equal length, and its contact found last."""
 
-@kernel(void(vector, vector, vector, vector, vector), fastmath=FAST)
+
+@kernel(fastmath=FAST)
 def _add_four(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
     """Add four waves s cos(ωξ) + c sin(ωξ) to the even part and to the odd part of a height."""
     n = even.size
@@ -30,7 +56,7 @@ def _add_four(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) ->
         even[j] += one + (s_2 * table[j + 5 * n] + s_3 * table[j + 7 * n])
 
 
-@kernel(void(vector, vector, vector, float64, float64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _add_one(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> None:
     """Add a wave s cos(ωξ) + c sin(ωξ) to the even part and to the odd part of a height."""
     n = even.size
@@ -39,7 +65,7 @@ def _add_one(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> No
         even[j] += s * table[j + n]
 
 
-@kernel(void(ROUGH_TYPE, vector, vector, vector, int64), inlined=False)
+@kernel(inline=False)
 def _sum_waves(f: Any, tables: Floats, even: Floats, odd: Floats, at: int) -> None:
     """The even part and the odd part of a sum of waves, whose factors begin `at` a place of the tables."""
     n = f.width
@@ -59,7 +85,7 @@ def _sum_waves(f: Any, tables: Floats, even: Floats, odd: Floats, at: int) -> No
         i += 1
 
 
-@kernel(types.UniTuple(float64, 2)(float64, float64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _cell(one: float, two: float) -> tuple[float, float]:
     """The part θ of a cell that touches, h⁺/(h⁺ - l⁻), and twice the mean gap there, h⁺ + l⁺.
 
@@ -72,7 +98,7 @@ def _cell(one: float, two: float) -> tuple[float, float]:
     return np.divide(press, press - (low - rest) + _TINY), press + rest
 
 
-@kernel(types.UniTuple(float64, 2)(float64, vector, vector, vector, vector, int64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _pressed(y: float, even: Floats, odd: Floats, right: Floats, left: Floats, cells: int) -> tuple[float, float]:
     """Σ θ (h⁺ + l⁺) and Σ 2θ over all cells, see `_cell`: times kc/2 they are F_y, (2), and -∂F_y/∂y.
 
@@ -94,14 +120,14 @@ def _pressed(y: float, even: Floats, odd: Floats, right: Floats, left: Floats, c
     return force, touching
 
 
-@kernel(float64(float64, float64, float64, float64, float64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _slope(part: float, one: float, two: float, steep: float, steeper: float) -> float:
     """The derivative of θ (h⁺ + l⁺) by x, θ (2 - θ) h' + θ² l': of a cell, with the slopes of f2 at both ends."""
     of_high, of_low = (steep, steeper) if one > two else (steeper, steep)
     return part * (2.0 - part) * of_high + part * part * of_low
 
 
-@kernel(types.UniTuple(float64, 3)(float64, vector, vector, vector, vector, vector, vector, int64), fastmath=FAST)
+@kernel(fastmath=FAST)
 def _pressed_steeply(
     y: float, even: Floats, odd: Floats, rise: Floats, turn: Floats, right: Floats, left: Floats, cells: int
 ) -> tuple[float, float, float]:
@@ -125,7 +151,7 @@ def _pressed_steeply(
     return force, touching, slope
 
 
-@kernel(void(ROUGH_TYPE, vector, float64), inlined=False)
+@kernel(inline=False)
 def _turn(f: Any, tables: Floats, place: float) -> None:
     """g sin ψ, g cos ψ and their slopes by x of each wave: ψ = ω `place` + ψ_0 where x - U since is `place`."""
     n = f.waves
@@ -150,8 +176,8 @@ def _turn(f: Any, tables: Floats, place: float) -> None:
     f.known = 1
 
 
-@kernel(void(ROUGH_TYPE, vector, float64, float64, int64), inlined=False)
-def press(f: Any, tables: Floats, place: float, y: float, steeply: int) -> None:
+@kernel(inline=False)
+def press(f: Any, tables: Floats, place: float, y: float, steeply: bool) -> None:
     """The contact where x - U since is `place`; ∂F_y/∂x only where it is asked for `steeply`.
 
     Where the pad touches everywhere, F_y = -2ak (y + mean f1) + Σ full sin ψ. Otherwise it is a sum over cells.
@@ -184,7 +210,7 @@ def press(f: Any, tables: Floats, place: float, y: float, steeply: int) -> None:
     if f.known < 2:
         _sum_waves(f, tables, even, odd, f.sines_at)
         f.known = 2
-    if steeply == 0:
+    if not steeply:
         force, touching = _pressed(y, even, odd, right, left, f.half_cells)
     else:
         rise = tables[at + 2 * n : at + 3 * n]

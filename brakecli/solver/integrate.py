@@ -4,38 +4,24 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple
 
 import numpy as np
-from numba import float64, int64, void
 
 from brakecli.solver import contact
-from brakecli.solver.compile import LARGEST, Floats, address, at_address, from_memory, kernel
+from brakecli.solver.arrays import Floats
+from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
+from brakecli.solver.loop import advance, take_sample
 from brakecli.solver.method import Method
+from brakecli.solver.plant import PLANT
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import (
-    CONTACT,
-    COUNTS,
-    EVALUATE,
-    PLANT,
-    PROBLEM,
-    STATE,
-    TANGENT,
-    TRACK,
-    WORK,
-    Beside,
-    Drive,
-    Pair,
-    Plant,
-    Plug,
-    new,
-)
-from brakecli.solver.roughness import turn
-from brakecli.solver.schedules import integral_at, slope_at
-from brakecli.solver.schemes import OwnStepsModule, SteppingModule
+from brakecli.solver.records import COEFFICIENTS, GRID, WEIGHTS, Pair, filled, one
+from brakecli.solver.roughness import turn_wheel
+from brakecli.solver.schedules import Schedule, integral_at, slope_at
+from brakecli.solver.schemes import OwnStepsModule
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, MOST_POWERS, Exponent, exponent, seed
@@ -57,20 +43,6 @@ Progress = Callable[[int], None]
 Counted = Callable[[str, int, int], None]
 """Called with what is counted, how many are done, and of how many; 0 where that is not known."""
 
-_NO_TRACK = new(TRACK)
-"""Track of motions that are not tracked: nothing is written into it."""
-_plant_at = from_memory(PLANT)
-_evaluate_at = at_address(EVALUATE)
-
-
-@kernel(void(int64, float64, float64, float64, float64))
-def touch(address: int, x: float, y: float, t: float, part: float) -> None:
-    """Evaluate the contact of a plant in memory, whatever its scheme, at time t + part (s)."""
-    p: Plant = _plant_at(address)
-    travel, travel_low = integral_at(p.drive.belt, t, part)
-    turn(travel, travel_low, p.layer)
-    _evaluate_at(p.layer.evaluate)(x, y, p.layer)
-
 
 @dataclass
 class Work:
@@ -84,8 +56,6 @@ class Work:
     unconverged_steps: int = 0
     non_unique_steps: int = 0
     most_evaluations: int = 0  # of one step
-    turns: int = 0  # steps after which friction points the other way, or holds
-    crossing: float = 0.0  # largest contact force (N) as friction turned within a step, without a stick
     evaluators: dict[str, int] = field(default_factory=dict)  # steps that each evaluator took
     solve_seconds: float = 0.0
     rounding: tuple[Floats, Floats] | None = None  # of exact steps: largest x, y, vx and vy and their errors by it
@@ -162,33 +132,25 @@ class Stepping:
         self.scheme = system.scheme
         self.work = Work()
         self.events = np.zeros((EVENTS, 2))
-        self.counts = new(COUNTS)
+        drive = system.belt, system.load
+        self.contact = build_layer(system.evaluator, system.pad, moving=True, room=sum(map(len, drive)))
+        plants = one(PLANT)
+        self.plant = plant = plants[0]
+        plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
+        plant.s = filled(WEIGHTS, system.weights._asdict())
+        plant.grid = filled(GRID, system.grid)
+        plant.layer = self.contact.layer
+        self._place(plant.drive, *drive)
+        self._arrays = plants, self.contact.tables, self.contact.scratch
+        self._layer = plant.layer, self.contact.tables, self.contact.scratch
+        self.state = plant[self.scheme.KEPT]
+        self._advance = self.scheme.advance if isinstance(self.scheme, OwnStepsModule) else advance
+        self.counts = plant.counts
         self.counts.level = self.scheme.LAG
-        self.tangent = new(TANGENT)
-        self.track = new(TRACK) if system.tracked else _NO_TRACK
-        # the same place in memory, which is read in a tenth of the time
-        self._level = np.frombuffer(self.counts, COUNTS)["level"]
-        self.plant = Plant(
-            c=system.coefficients,
-            s=system.weights,
-            grid=system.grid,
-            drive=Drive(system.belt, system.load),
-            layer=build_layer(system.evaluate, system.pad, contact.load_press(system.evaluator), moving=True),
-            plug=_plugged_in(system),
-            state=new(self.scheme.STATE),
-            problem=new(PROBLEM),
-            work=new(WORK),
-            counts=self.counts,
-            tangent=self.tangent,
-            beside=Beside(new(STATE), new(PROBLEM), new(CONTACT), new(WORK)),
-            track=self.track,
-        )
+        self.tangent = plant.tangent
         self.tangent.rate = 2.0 * math.pi * system.natural_frequencies[1]
         if system.tangents:
-            seed(self.tangent, self.plant.beside.state, self.plant.s.h)
-        self._memory = np.zeros(LARGEST, np.int8)
-        self._plant_at = self._memory.ctypes.data
-        self.scheme.hold(self.plant, self._plant_at)
+            seed(self.tangent, plant.beside.state, plant.s.h)
         self._begin()
         if system.start_error is not None:
             self.tangent.knows = 1
@@ -197,7 +159,7 @@ class Stepping:
             self.tangent.error[0, :2] = system.start_error
             self.tangent.most = system.most_error
         if system.tracked:
-            follow(self.track, self.plant.state.v_x)
+            follow(self.plant.track, self.state.v_x)
         self._start_energy = self._energy()
 
     def run(
@@ -222,9 +184,7 @@ class Stepping:
             sink(rows)
             progress(int(self.counts.level) - lag)
         if not work.failed:
-            row = np.zeros(len(HISTORY))
-            self.scheme.sample(self.plant, row)
-            sink(row[None, :])
+            sink(self.last_row()[None, :])
         self._count()
         end = self._energy()
         light = self.system.method.own_steps and self.system.nodes > 0  # see `phases.find_slopes`
@@ -237,7 +197,7 @@ class Stepping:
         found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h, lag) if carried else None
         track = None
         if self.system.tracked:
-            track = tracked(self.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
+            track = tracked(self.plant.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
         own = None
         if self.tangent.knows == 1:
             grown = (
@@ -249,19 +209,38 @@ class Stepping:
         return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
 
     def block(self, stop: int) -> Floats:
-        """Step to level `stop`; the samples on the way."""
+        """Step to level `stop`, or to the next sample where steps are the scheme's own; the samples on the way."""
         system = self.system
         lag = self.scheme.LAG
         per_sample = self.system.per_sample
-        first = self._level.item() - lag
+        if system.method.own_steps:
+            stop = -(-stop // per_sample) * per_sample
+        first = int(self.counts.level) - lag
         rows = np.empty((-(-(stop - lag) // per_sample) + (-first // per_sample), len(HISTORY)))
-        failure = self.scheme.advance(self._plant_at, rows, self.events, stop)
-        done = self._level.item() - lag
+        failure = self._advance(*self._arrays, rows, self.events, stop)
+        done = int(self.counts.level) - lag
         if failure:
             self.work.failure = Failure(failure)
             self.work.failure_time = system.step * done
             done += 1  # the sample of the failing step's own level has been taken
         return rows if done == stop - lag else rows[: -(-done // per_sample) + (-first // per_sample)]
+
+    def _place(self, drive: Any, belt: Schedule, load: Schedule) -> None:
+        """Put the knots of speed and load at the end of the scratch."""
+        scratch = self.contact.scratch
+        drive.load_end = len(scratch)
+        drive.belt_end = drive.load_at = len(scratch) - len(load)
+        drive.belt_at = drive.belt_end - len(belt)
+        scratch[drive.belt_at : drive.belt_end] = belt
+        scratch[drive.load_at :] = load
+
+    def last_row(self) -> Floats:
+        """The sample at the last level."""
+        if self.system.method.own_steps:
+            return np.array(self.state.row)
+        row = np.zeros(len(HISTORY))
+        take_sample(self.plant, self.contact.tables, self.contact.scratch, row)
+        return row
 
     def _begin(self) -> None:
         """Fill the state at the scheme's first level, with the contact force there as the first guess."""
@@ -280,21 +259,24 @@ class Stepping:
         found = plant.layer.contact
         if system.method.start == "consistent":
             acceleration = _acceleration(system, (x, y), velocity, found.normal_force)
-        self.scheme.begin(plant.s, plant.state, (x, y), velocity, acceleration)
-        plant.state.force = plant.work.force_before = found.normal_force
+        self.scheme.begin(plant.s, self.state, (x, y), velocity, acceleration)
+        self.state.force = plant.work.force_before = found.normal_force
         if not system.method.own_steps:
-            plant.state.force_before = plant.state.force_earlier = found.normal_force
+            self.state.force_before = self.state.force_earlier = found.normal_force
         plant.work.store_x_before = found.store_x
 
     def _evaluate_at(self, x: float, y: float, steps: float) -> None:
         """Evaluate the contact, `steps` steps after t = 0."""
-        t, part = divmod(steps, self.system.per_sample)
-        touch(self._plant_at, x, y, t * self.system.interval, part * self.system.step)
+        samples, part = divmod(steps, self.system.per_sample)
+        t = samples * self.system.interval
+        travel, travel_low = integral_at(self.system.belt, t, part * self.system.step)
+        turn_wheel(travel, travel_low, *self._layer)
+        fill(x, y, *self._layer)
 
     def _energy(self) -> tuple[float, float, float]:
         """Kinetic energy, energy of the links and of the contact (J), where the scheme places them."""
         plant = self.plant
-        kinetic, links, (x, y), back = self.scheme.mechanical_energy(plant.c, plant.s, plant.state)
+        kinetic, links, (x, y), back = self.scheme.mechanical_energy(plant.c, plant.s, self.state)
         self._evaluate_at(x, y, int(self.counts.level) - back)
         return float(kinetic), float(links), float(plant.layer.contact.store)
 
@@ -303,13 +285,11 @@ class Stepping:
         work = self.work
         work.steps = int(counts.kinds.sum())
         if self.system.method.row.exact:
-            work.rounding = self.plant.state.largest.copy(), self.plant.state.worst.copy()
+            work.rounding = self.state.largest.copy(), self.state.worst.copy()
         work.contact_evaluations = int(counts.evaluations)
         work.unconverged_steps = int(counts.unconverged)
         work.non_unique_steps = int(counts.rising)
         work.most_evaluations = int(counts.most)
-        work.turns = int(counts.turns)
-        work.crossing = float(counts.crossing)
         work.evaluators = {kind: int(n) for kind, n in zip(contact.kinds(), counts.kinds, strict=False) if n}
         work.unconverged = self.events[: min(work.unconverged_steps, EVENTS)].copy()
 
@@ -326,15 +306,3 @@ def _acceleration(system: System, position: Pair, velocity: Pair, force: float) 
     if sliding != 0.0:
         return (g_1 - np.sign(sliding) * c.phi * force) / c.m, g_2 / c.m
     return minimise(c.m, 0.0, c.m, g_1, g_2, c.phi * force, float(slope_at(system.belt, 0.0)))[:2]
-
-
-def _plugged_in(system: System) -> Plug:
-    """What the loop calls: the kernels of the scheme and the iteration of a step."""
-    scheme = system.scheme
-    if system.method.own_steps:
-        return Plug(0, 0, 0 if system.method.row.exact else address(cast(OwnStepsModule, scheme).solve))
-    from brakecli.solver import implicit_step  # its kernels are compiled only where they are needed
-
-    solve = implicit_step.newton if system.method.iteration == "newton" else implicit_step.fixed_point
-    stepping = cast(SteppingModule, scheme)
-    return Plug(address(stepping.prepare), address(stepping.finish), address(solve))

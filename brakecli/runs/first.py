@@ -1,0 +1,29 @@
+"""How fine a run begins that is to keep a tolerance."""
+
+import math
+
+from brakecli.solver.contact import EVALUATORS
+from brakecli.solver.contact.pad import NODES, default_nodes
+from brakecli.solver.system import System
+
+FIRST = 0.2  # tolerance of the first run that knows its own error, over the requested one
+FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
+LONGEST_TURN = 0.4  # rad, in a first step
+FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
+FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
+
+
+def first_step(system: System) -> float:
+    """The step (s) that a difference scheme begins with: it shows how large its error is."""
+    fastest = 2.0 * math.pi * max(system.natural_frequencies[1], 1e-300)
+    turn = min(LONGEST_TURN, math.sqrt(FIRST_TURN * system.method.tolerance))
+    return min(turn / fastest, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
+
+
+def first_nodes(system: System) -> int:
+    """The nodes that a run begins with, which hardly resolve the shortest wave; 0 where none are needed."""
+    if system.smooth or not EVALUATORS[system.method.evaluator].needs_nodes:
+        return 0
+    usual = default_nodes(system.half_length, system.shoe, system.wheel)
+    finer = max(0, int(0.5 * math.log2(FINEST_FIRST / system.method.tolerance)))
+    return max(NODES, usual // 4) << finer

@@ -1,0 +1,117 @@
+"""The block beside a motion: small disturbances of it, and its error by rounding, which obey the same linear map.
+
+Within a phase a disturbance w follows the same equation as the motion: w(t) = exp(A t) w(0). The disturbed
+motion comes to an event n·z = 0 later, by -n·w / n·f, where f = dz/dt is the velocity of the motion as it arrives.
+For that time it goes on with f and not with f', the velocity behind the event:
+
+    w' = (I + (f' - f) nᵀ / (nᵀ f)) w,
+
+the saltation matrix (R. I. Leine, H. Nijmeijer, Dynamics and Bifurcations of Non-Smooth Mechanical Systems,
+Springer 2004, ch. 7). Where stick begins it takes away what w has along ẋ. Where stick ends, and where contact is
+lost or made, no force jumps: f' = f, and it is the identity.
+"""
+
+import math
+from typing import Any
+
+from brakecli.solver.double_double import ROUNDING
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion import exact, runge_kutta
+from brakecli.solver.motion.phases import STICK
+from brakecli.solver.motion.record import COLUMNS, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.plant import Plant
+
+_ERROR_TERMS = 9
+"""Terms of the series of an error and of a disturbance beside it, which are known to a few digits only."""
+
+
+@kernel
+def carry(e: Any, m: Any) -> None:
+    """Move the columns along a whole step."""
+    a = e.now
+    for j in range(COLUMNS):  # a number that is known has the compiler make vectors
+        if j >= m.count:
+            break
+        x = m.columns[j, X]
+        y = m.columns[j, Y]
+        v_x = m.columns[j, V_X]
+        v_y = m.columns[j, V_Y]
+        new_x = (a[X, X] * x + a[Y, X] * y) + (a[V_X, X] * v_x + a[V_Y, X] * v_y)
+        new_y = (a[X, Y] * x + a[Y, Y] * y) + (a[V_X, Y] * v_x + a[V_Y, Y] * v_y)
+        new_v_x = (a[X, V_X] * x + a[Y, V_X] * y) + (a[V_X, V_X] * v_x + a[V_Y, V_X] * v_y)
+        new_v_y = (a[X, V_Y] * x + a[Y, V_Y] * y) + (a[V_X, V_Y] * v_x + a[V_Y, V_Y] * v_y)
+        m.columns[j, X] = new_x
+        m.columns[j, Y] = new_y
+        m.columns[j, V_X] = new_v_x
+        m.columns[j, V_Y] = new_v_y
+    if m.rounds == 1:
+        _round(e, m)
+
+
+@kernel(inline=False)
+def carry_part(e: Any, m: Any) -> None:
+    """Move the columns along the part of the last step that has been taken: Σ (A s)^k w/k!, s in seconds."""
+    seconds = m.part * m.span
+    for j in range(m.count):
+        x = m.columns[j, X]
+        y = m.columns[j, Y]
+        v_x = m.columns[j, V_X]
+        v_y = m.columns[j, V_Y]
+        moved_x = x
+        moved_y = y
+        moved_v_x = v_x
+        moved_v_y = v_y
+        for k in range(1, _ERROR_TERMS if m.rounds == 1 else TERMS):
+            a_x, a_y = exact.acceleration(e, m.old, x, y, v_x, v_y)
+            part = seconds / k
+            x = part * v_x
+            y = part * v_y
+            v_x = part * a_x
+            v_y = part * a_y
+            moved_x += x
+            moved_y += y
+            moved_v_x += v_x
+            moved_v_y += v_y
+        m.columns[j, X] = moved_x
+        m.columns[j, Y] = moved_y
+        m.columns[j, V_X] = moved_v_x
+        m.columns[j, V_Y] = moved_v_y
+    if m.rounds == 1:
+        _round(e, m)
+
+
+@kernel
+def _round(e: Any, m: Any) -> None:
+    """Add a bound of the rounding of a step to the error, ε Σ |z_i now_ik|, with the signs that do most harm."""
+    a = e.now
+    x = m.begin[X]
+    y = m.begin[Y]
+    v_x = m.begin[V_X]
+    v_y = m.begin[V_Y]
+    for i in range(4):
+        place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
+        m.columns[0, i] += math.copysign(ROUNDING * (place + e.noise[i]), m.columns[0, i])
+
+
+@kernel(inline=False)
+def jump(p: Plant) -> bool:
+    """Take the columns through the event at the end of the last step; False where it is only grazed."""
+    m = p.block
+    falls = exact.falls(p.exact, m) if m.exact == 1 else runge_kutta.falls(p)
+    if falls >= 0.0:
+        return False
+    for j in range(m.count):
+        late = 0.0
+        for i in range(4):
+            late += m.normal[i] * m.columns[j, i] / falls
+        for i in range(4):
+            m.columns[j, i] += (m.leaves[i] - m.arrives[i]) * late
+    return True
+
+
+@kernel
+def hold_on(m: Any) -> None:
+    """In stick nothing is left of the error of ẋ, nor of what a disturbance beside it has there."""
+    if m.rounds == 1 and m.phase == STICK:
+        for j in range(m.count):
+            m.columns[j, V_X] = 0.0

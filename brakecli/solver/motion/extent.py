@@ -1,0 +1,83 @@
+"""How far a motion reaches: extremes of its state and of its margins, the time in each phase, and its turns."""
+
+import math
+from typing import Any
+
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion import exact
+from brakecli.solver.motion.cubic import lowest
+from brakecli.solver.motion.locate import NO_EVENT, root
+from brakecli.solver.motion.phases import STICK
+from brakecli.solver.motion.record import BANDS, MARGINS, PHASES, TERMS, V_X, X
+from brakecli.solver.track import put, turned
+
+_BANDS: tuple[float, ...] = 0.25, 0.35
+"""Of the standard deviation of v_x. A whole run counts the rises through one of 0.3."""
+
+
+@kernel(inline=False)
+def begin(m: Any) -> None:
+    """Begin to note, from the motion reached on."""
+    m.square = 0.0
+    for phase in range(PHASES):
+        m.spent[phase] = 0.0
+        for k in range(MARGINS):
+            m.least[phase, k] = math.inf
+    for i in range(4):
+        m.low[i] = m.high[i] = m.z[i]
+    for k in range(BANDS):
+        m.beaten[k] = 0
+        m.side[k] = 0
+
+
+@kernel(inline=False)
+def zero_of_velocity(e: Any, m: Any) -> float:
+    """The part of the last step's span at which v_x passes through zero; puts the motion there in `at`."""
+    sign = 1.0 if m.begin[V_X] > 0.0 else -1.0
+    exact.expand(e, m.begin, m.old, m.span)
+    for k in range(TERMS):
+        e.polynomial[0, k] = sign * e.series[k, V_X]
+    part = root(e, 0, 0.0, m.part)
+    exact.reach(e, part)
+    return part
+
+
+@kernel(inline=False)
+def note_turn(e: Any, m: Any, track: Any) -> None:
+    """Note a turning point in the last step."""
+    kind = turned(track, m.z[V_X])
+    if kind < 0:
+        return
+    part = 0.0  # at the event behind which the step began, where v_x was that of a wheel at rest
+    place = m.begin[X]
+    if m.begin[V_X] * m.z[V_X] < 0.0:
+        part = zero_of_velocity(e, m)
+        place = e.at[X]
+    put(track, kind, m.base + m.time + (part - m.part) * m.span, place)
+
+
+@kernel(inline=False)
+def note(e: Any, m: Any) -> None:
+    """Note what is least and largest in the last step, and how long it took."""
+    seconds = m.part * m.span
+    m.spent[m.old] += seconds
+    for i in range(4):
+        m.low[i] = min(m.low[i], m.z[i])
+        m.high[i] = max(m.high[i], m.z[i])
+    if m.begin[V_X] * m.z[V_X] < 0.0:
+        zero_of_velocity(e, m)
+        m.low[X] = min(m.low[X], e.at[X])
+        m.high[X] = max(m.high[X], e.at[X])
+    if m.which == NO_EVENT and m.span == m.h:
+        for k in range(MARGINS if m.old == STICK else MARGINS - 1):
+            fall = m.margins[MARGINS + k]
+            rise = e.before[4 + MARGINS + k]
+            if fall < 0.0 < rise:
+                _, value = lowest(m.margins[k], fall, e.before[4 + k], rise)
+                m.least[m.old, k] = min(m.least[m.old, k], max(value, 0.0))
+    m.square += 0.5 * seconds * (m.begin[V_X] ** 2 + m.z[V_X] ** 2)
+    for k in range(BANDS if m.band > 0.0 else 0):
+        if abs(m.z[V_X]) > _BANDS[k] * m.band:
+            below = 1 if m.z[V_X] < 0.0 else 0
+            m.beaten[k] += 1 if m.side[k] > below else 0
+            m.side[k] = below

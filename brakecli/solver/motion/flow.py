@@ -1,0 +1,196 @@
+"""A motion on smooth pads as Python sees it: carried over a span, or followed to what becomes of it."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.solver.arrays import Floats
+from brakecli.solver.coefficients import Coefficients
+from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.solver.motion.record import BELT, LOAD, V_X
+from brakecli.solver.motion.tasks import FLY, SEEK, SWING, advance
+from brakecli.solver.plant import PLANT
+from brakecli.solver.records import COEFFICIENTS, filled, one
+from brakecli.solver.system import System, longest_step
+
+FOREVER = 1e300
+"""A time (s) that no motion reaches: finite, as a mode that decays does not grow in it at all."""
+
+
+class Orbit(NamedTuple):
+    """A motion that repeats (SI units): along a branch, forced by waves, or on the way of a run."""
+
+    period: float
+    amplitude: float  # half of peak to peak of x
+    stick_fraction: float
+    contact_loss_fraction: float
+    state: tuple[float, ...]  # x, y, v_x and v_y at a place of it; at t = 0 of the waves where they force it
+    word: tuple[int, ...]  # phases, from there
+    times: tuple[float, ...]  # when they change, from there
+
+    @property
+    def frequency(self) -> float:
+        """Hz."""
+        return 1.0 / self.period
+
+
+_NO_SCRATCH = np.zeros(1)
+_NO_ROWS = np.zeros((1, 1))
+
+
+def _done(plants: Any, block: Any, task: int, seconds: float = 0.0) -> int:
+    """Have the motion of a block do a task; how that ends."""
+    block.task = task
+    block.seconds = seconds
+    return int(advance(plants, _NO_SCRATCH, _NO_SCRATCH, _NO_ROWS, _NO_ROWS, 0))
+
+
+def _plants(c: Coefficients, stiffness: float, belt: float, load: float) -> Any:
+    """An array of the record of a shoe on smooth pads, at constant speed and load."""
+    plants = one(PLANT)
+    plant = plants[0]
+    plant.c = filled(COEFFICIENTS, c._asdict())
+    plant.exact.stiffness = stiffness
+    plant.block.exact = 1
+    plant.block.z[BELT] = belt
+    plant.block.z[LOAD] = load
+    plant.block.h = longest_step(c, stiffness)
+    return plants
+
+
+class SmoothFlow:
+    """The flow of a shoe on smooth pads, at constant speed and load; one call after the other.
+
+    After a call `path` holds what is known of the way, `state` its end (x, y, v_x, v_y), and `derivative` that of
+    the end by the begin: one row for each component of the end.
+    """
+
+    def __init__(self, c: Coefficients, stiffness: float, belt: float, load: float) -> None:
+        """From the contact's stiffness (N/m), U (m/s) and Q (N)."""
+        self._plants = _plants(c, stiffness, belt, load)
+        self.path = self._plants[0].block
+
+    @classmethod
+    def of(cls, system: System) -> "SmoothFlow":
+        """The flow of a system; raises ValueError where surfaces are rough, or where speed or load change."""
+        if not (system.smooth and system.steady):
+            raise ValueError("the exact flow needs smooth pads, a constant speed and a constant load")
+        return cls(system.coefficients, system.contact_stiffness, system.belt_speed, system.load_at_start)
+
+    def __call__(self, state: Floats, span: float, tangents: bool = True) -> int:
+        """Carry a state over a span (s), with its derivative unless that is not needed; how it ends, as `DONE`."""
+        self.path.z[:4] = state
+        self.path.count = 4 if tangents else 0
+        return _done(self._plants, self.path, FLY, span)
+
+    @property
+    def state(self) -> Floats:
+        """x, y (m), v_x and v_y (m/s) at the end of the last span."""
+        return np.array(self.path.z[:4])
+
+    @property
+    def derivative(self) -> Floats:
+        """Derivative of the last end by its begin, (4, 4), in SI units."""
+        return np.array(self.path.columns.T)
+
+    @property
+    def word(self) -> tuple[int, ...]:
+        """The phases of the last span."""
+        return tuple(self.path.word[: self.path.events + 1].tolist())
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """When they change, s."""
+        return tuple(self.path.times[: self.path.events].tolist())
+
+
+class Pursuit:
+    """A motion on smooth pads, at constant speed and load, which is followed to what becomes of it.
+
+    `way` holds how it comes to its orbit, and `path` the motion: how far it has come, or the orbit that is found.
+    """
+
+    def __init__(
+        self,
+        c: Coefficients,
+        acting: tuple[float, float, float],
+        state: Floats,
+        rest: Floats,
+        modes: tuple[NDArray[np.complex128], NDArray[np.complex128]],
+        duration: float = FOREVER,
+    ) -> None:
+        """Begin from a state (x, y, v_x, v_y), with what acts: the contact's stiffness (N/m), U (m/s), Q (N).
+
+        `rest`: x and y of steady sliding. `modes`: its eigenvalues, and the vectors of position and velocity in
+        columns. Raises LinAlgError where two of them are alike.
+        """
+        self._plants = _plants(c, *acting)
+        self.path = self._plants[0].block
+        self.way = self._plants[0].way
+        o = self.way
+        values, vectors = modes
+        inverse = np.linalg.inv(modes[1])
+        self.path.x, self.path.y, self.path.v_x, self.path.v_y = state
+        belt = acting[1]
+        o.duration = duration
+        o.sliding = BACKWARD if belt > 0.0 else FORWARD
+        o.rest[:2] = rest
+        o.room[:] = (-rest[1], abs(belt))
+        o.into[0] = inverse.real
+        o.into[1] = inverse.imag
+        o.growth[:] = values.real
+        o.reach[:] = np.abs(vectors[:3]).T
+
+    def seek(self) -> int:
+        """Go on for some time; what the motion has come to, as `FOUND`."""
+        return _done(self._plants, self.path, SEEK)
+
+    def swing(self, begin: Floats, seconds: float) -> None:
+        """Find the least and the largest x of a linear motion from a state on, for some time (s)."""
+        self.path.z[:4] = begin
+        _done(self._plants, self.path, SWING, seconds)
+
+    @property
+    def time(self) -> float:
+        """How far the motion has been followed, s."""
+        return float(self.way.time if self.way.on_orbit else self.path.time)
+
+    @property
+    def steps(self) -> int:
+        """Steps so far."""
+        return int(self._plants[0].counts.kinds.sum())
+
+    @property
+    def evaluations(self) -> int:
+        """Steps so far in which the shoe touched the wheel."""
+        return int(self._plants[0].counts.evaluations)
+
+    @property
+    def state(self) -> Floats:
+        """x, y (m), v_x and v_y (m/s) that the motion has reached."""
+        return np.array(self.way.saved if self.way.on_orbit else self.path.z[:4])
+
+    @property
+    def orbit(self) -> Orbit:
+        """The orbit, once it is found."""
+        o = self.way
+        path = self.path
+        x, y, v_y = o.point.tolist()
+        period = float(o.period)
+        spent = (path.spent / period).tolist()
+        word = path.word[: path.events + 1].tolist()
+        times = path.times[: path.events].tolist()
+        state = x, y, 0.0, v_y
+        return Orbit(period, float(o.amplitude), spent[STICK], spent[OPEN], state, tuple(word), tuple(times))
+
+    @property
+    def fastest(self) -> float:
+        """Largest v_x on the orbit over the wheel's speed."""
+        path = self.path
+        return float(max(path.low[V_X] / path.z[BELT], path.high[V_X] / path.z[BELT]))
+
+    @property
+    def multiplier(self) -> float:
+        """Largest part of its size that a disturbance of the orbit keeps in a cycle; an orbit attracts below 1."""
+        return float(np.abs(np.linalg.eigvals(self.way.map)).max())

@@ -1,0 +1,48 @@
+"""Everything that a motion works with, in one record; tables and scratch are two arrays beside it."""
+
+from typing import Any
+
+from brakecli.solver.motion.cells import CELLS
+from brakecli.solver.motion.record import BLOCK, EXACT, PURSUIT, RUNGE
+from brakecli.solver.motions import MOTION
+from brakecli.solver.records import (
+    BESIDE,
+    COEFFICIENTS,
+    COUNTS,
+    DRIVE,
+    GRID,
+    LAYER,
+    PROBLEM,
+    STATE,
+    TANGENT,
+    TRACK,
+    WEIGHTS,
+    WORK,
+    record,
+)
+
+PLANT = record(
+    c=COEFFICIENTS,  # given
+    s=WEIGHTS,
+    grid=GRID,
+    drive=DRIVE,
+    layer=LAYER,
+    state=STATE,  # the motion of a difference scheme
+    motion=MOTION,  # that of an event-driven one
+    block=BLOCK,  # that of a piecewise-exact one, and what goes along with it
+    exact=EXACT,  # its matrices
+    runge=RUNGE,  # its Runge-Kutta step
+    cells=CELLS,  # and the rough pad of one
+    way=PURSUIT,  # to its orbit
+    problem=PROBLEM,
+    work=WORK,
+    counts=COUNTS,
+    tangent=TANGENT,
+    beside=BESIDE,
+    track=TRACK,
+)
+"""What is given to a run, and what its loop changes. The tables are those of the pad, which many motions
+share; the scratch is the motion's own: what the contact keeps, phases of the wheel, knots of speed and load.
+"""
+
+Plant = Any  # a record of PLANT
