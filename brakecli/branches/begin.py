@@ -11,7 +11,7 @@ from brakecli.branches.line import Shoe
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array
-from brakecli.solver.motion.advance import DONE
+from brakecli.solver.motion.events import DONE
 from brakecli.solver.motion.flow import Orbit, Pursuit
 from brakecli.solver.motion.orbit import FOUND, LINEAR
 from brakecli.stop import signalled

@@ -17,7 +17,7 @@ from brakecli.branches.line import Line
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Guess, Problem, Seen, steps_in_p
 from brakecli.errors import CaseError
-from brakecli.solver.motion.advance import DONE, EVENTFUL, GRAZED
+from brakecli.solver.motion.events import DONE, EVENTFUL, GRAZED
 from brakecli.solver.motion.flow import Orbit, SmoothFlow
 from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
 

@@ -14,7 +14,7 @@ from brakecli.branches.cycles import Chart, Cycles, Flow
 from brakecli.branches.line import Line
 from brakecli.branches.problem import Array
 from brakecli.errors import CaseError, Problem
-from brakecli.solver.motion.advance import DONE, EVENTFUL, GRAZED, LONG
+from brakecli.solver.motion.events import DONE, EVENTFUL, GRAZED, LONG
 from brakecli.solver.motion.phases import BACKWARD, OPEN, STICK
 from brakecli.solver.motion.rough import RoughFlow, Status, default_cells, default_steps
 from brakecli.solver.steady_sliding import steady_sliding, tabulated

@@ -1,6 +1,6 @@
 """Runs that know their own error: one is made and, while its error is too large, one as much finer as it says.
 
-The error is carried along with the motion, that of steps and that of nodes apart (`event_driven.error`). A run
+The error is carried along with the motion, that of steps and that of nodes apart (`motion.errors`). A run
 that is too coarse says how fine the next one has to be, and one that is fine enough needs no other.
 """
 

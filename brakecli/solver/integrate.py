@@ -156,7 +156,7 @@ class Stepping:
             self.tangent.knows = 1
             self.tangent.unsure = math.inf
             self.tangent.moved = math.inf
-            self.tangent.error[0, :2] = system.start_error
+            plant.block.columns[0, :2] = system.start_error
             self.tangent.most = system.most_error
         if system.tracked:
             follow(self.plant.track, self.state.v_x)
@@ -187,7 +187,7 @@ class Stepping:
             sink(self.last_row()[None, :])
         self._count()
         end = self._energy()
-        light = self.system.method.own_steps and self.system.nodes > 0  # see `phases.find_slopes`
+        light = self.system.method.own_steps and self.system.nodes > 0  # see `forces.settle`
         if light:
             self.plant.work.roughness += end[2] - self._start_energy[2]
         energy = account(self._start_energy, end, self.plant.work)

@@ -4,7 +4,6 @@ from typing import Any
 
 from brakecli.solver.motion.cells import CELLS
 from brakecli.solver.motion.record import BLOCK, EXACT, PURSUIT, RUNGE
-from brakecli.solver.motions import MOTION
 from brakecli.solver.records import (
     BESIDE,
     COEFFICIENTS,
@@ -28,8 +27,7 @@ PLANT = record(
     drive=DRIVE,
     layer=LAYER,
     state=STATE,  # the motion of a difference scheme
-    motion=MOTION,  # that of an event-driven one
-    block=BLOCK,  # that of a piecewise-exact one, and what goes along with it
+    block=BLOCK,  # that of one with events, and what goes along with it
     exact=EXACT,  # its matrices
     runge=RUNGE,  # its Runge-Kutta step
     cells=CELLS,  # and the rough pad of one

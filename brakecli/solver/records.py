@@ -93,8 +93,6 @@ COUNTS = record(
 PARTS = 512
 """Parts of a run in which the growth of a disturbance, and the works, are kept apart."""
 
-DISTURBED = 2
-"""Row of the disturbance behind the errors."""
 SPANS = 64
 """Spans of a run, in each of which the largest error is kept."""
 
@@ -110,10 +108,6 @@ TANGENT = record(
     beyond=int,  # 1 where it is more than the most
     placed=int,  # events that were placed inside steps of a difference scheme
     logs=(float, PARTS),  # ln of its growth in each part of the run
-    error=(
-        float,
-        (DISTURBED + 1, 4),
-    ),  # of the motion, by its steps and by the nodes; and the disturbance, in a step
     worst=(float, (SPANS, 3, 4)),  # their largest size in each span of the run, and that of their sum
 )
 """A disturbance, and the error of a motion, that are carried along with it, see `solver.tangent`."""

@@ -1,7 +1,7 @@
 """A small disturbance of a motion, carried along with it: does it grow or fade, and how fast?
 
 Within a phase it follows the derivative of the steps of the motion, or of the equations where the contact changes
-within a step (`schemes.event_driven.error`). Where the shoe comes to the wheel's velocity, and nowhere else, a
+within a step (`motion.errors`). Where the shoe comes to the wheel's velocity, and nowhere else, a
 force jumps: there the disturbance of the sliding velocity is multiplied by the ratio of its accelerations behind
 and before, which is 0 where the shoe sticks. That is all of the saltation matrix (R. I. Leine and H. Nijmeijer,
 Dynamics and Bifurcations of Non-Smooth Mechanical Systems, Springer 2004, chapter 7): the normal of the event is

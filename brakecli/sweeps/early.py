@@ -28,7 +28,7 @@ from brakecli.runs.certificate import ROUNDING, Certificate
 from brakecli.runs.settled import Judged
 from brakecli.solver.arrays import Floats
 from brakecli.solver.integrate import Work
-from brakecli.solver.motion.advance import DONE
+from brakecli.solver.motion.events import DONE
 from brakecli.solver.motion.flow import Pursuit, SmoothFlow
 from brakecli.solver.motion.orbit import FOUND, GOING_ON, LINEAR
 from brakecli.solver.motion.phases import STICK

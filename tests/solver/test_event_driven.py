@@ -16,8 +16,8 @@ from brakecli.case.system import system_of
 from brakecli.runs.limits import check
 from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.method import Method
+from brakecli.solver.motion.tableaus import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
 from brakecli.solver.quantities import HISTORY, ContactState, Failure
-from brakecli.solver.runge_kutta import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
 from tests.campaign import counts
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact
@@ -393,7 +393,7 @@ def test_events_without_progress_are_a_failure_with_a_name() -> None:
     motion = Stepping(system_of(event_driven(SQUEAL)))
     state = motion.state
     # as if 1000 of them had come, and no time gone by
-    state.events = 1000
+    state.crowded = 1000
     state.events_time = 1e9
     work = motion.run().work
     assert work.failure is Failure.STALLED
@@ -405,7 +405,7 @@ def test_phases_that_end_at_once_are_a_failure_with_a_name() -> None:
     case = event_driven(SQUEAL, wheel__angular_speed=0.0, friction__coefficient=0.1)
     assert simulate(case).work.failure is Failure.NONE
     motion = Stepping(system_of(case))
-    motion.state.switches = 60
+    motion.plant.runge.switches = 60
     work = motion.run().work
     assert work.failure is Failure.STALLED
     assert work.steps == 0

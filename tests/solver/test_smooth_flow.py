@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from brakecli.case.system import system_of
 from brakecli.solver.arrays import Floats
 from brakecli.solver.integrate import solve
-from brakecli.solver.motion.advance import DONE, EVENTFUL
 from brakecli.solver.motion.cubic import lowest
+from brakecli.solver.motion.events import DONE, EVENTFUL
 from brakecli.solver.motion.flow import SmoothFlow
 from brakecli.solver.motion.phases import BACKWARD, FORWARD, HEIGHT, OPEN, SLIDING, STICK
 from brakecli.solver.motion.record import MOST_SMOOTH_EVENTS

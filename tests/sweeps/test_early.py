@@ -20,7 +20,7 @@ from brakecli.errors import BrakecliError
 from brakecli.files.fields import POINT
 from brakecli.runs.settled import Judged
 from brakecli.solver.integrate import solve
-from brakecli.solver.motion.advance import DONE, EVENTFUL
+from brakecli.solver.motion.events import DONE, EVENTFUL
 from brakecli.solver.motion.flow import SmoothFlow
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.system import Initial, System

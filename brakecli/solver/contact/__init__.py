@@ -18,7 +18,7 @@ class EvaluatorModule(Protocol):
     """What every evaluator has.
 
     It may also have a kernel `press` of the same signature, which finds normal force, stiffness, fraction, kind
-    and validity alone, for event-driven runs, with a branch in `event_driven.phases`.
+    and validity alone, for event-driven runs, with a branch in `motion.forces`.
     """
 
     def evaluate(self, x: float, y: float, layer: "Layer", tables: "Floats", scratch: "Floats", /) -> None:

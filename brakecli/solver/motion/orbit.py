@@ -20,7 +20,8 @@ from typing import Any
 from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, extent
-from brakecli.solver.motion.advance import DONE, LONG, STALLED, TURNED, advance, begin, fly
+from brakecli.solver.motion.advance import advance, begin, fly
+from brakecli.solver.motion.events import DONE, LONG, STALLED, TURNED
 from brakecli.solver.motion.record import BELT, MOST_SMOOTH_EVENTS, MOST_TURNS, V_X, V_Y, X, Y
 from brakecli.solver.plant import Plant
 from brakecli.solver.roughness import TWO_PI
@@ -54,7 +55,7 @@ def _put_on_section(m: Any, point: Floats) -> None:
 
 
 @kernel(inline=False)
-def _once_around(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
+def _once_around(p: Plant, scratch: Floats, o: Any) -> bool:
     """From `point` over a period, and on to the section: the return in `kept`, and M; False where there is none.
 
     The rest of the way to the section, -ẋ/ẍ, is followed along the velocity. It vanishes as Newton's iteration
@@ -62,7 +63,7 @@ def _once_around(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
     """
     m = p.block
     _put_on_section(m, o.point)
-    if fly(p, tables, scratch, o.period, 4) != DONE or m.velocity[V_X] >= 0.0:
+    if fly(p, scratch, o.period, 4) != DONE or m.velocity[V_X] >= 0.0:
         return False
     rest = -m.z[V_X] / m.velocity[V_X]
     o.period += rest
@@ -100,7 +101,7 @@ def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
 
 
 @kernel(inline=False)
-def _measured(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
+def _measured(p: Plant, scratch: Floats, o: Any) -> bool:
     """Go round the orbit for its numbers; False where it takes another way than the motion did.
 
     Its falls are not counted: of a short rise and fall of ẋ within a step the motion may have seen nothing.
@@ -114,7 +115,7 @@ def _measured(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
         _put_on_section(m, o.point)
         p.work.belt = 0.0
         m.account = 1
-        ends = fly(p, tables, scratch, o.period, 0)
+        ends = fly(p, scratch, o.period, 0)
         exact.add_works(p.c, p.exact, m, p.work)
         m.account = 0
         m.band = math.sqrt(m.square / o.period)
@@ -126,7 +127,7 @@ def _measured(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
 
 
 @kernel(inline=False)
-def _closed(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
+def _closed(p: Plant, scratch: Floats, o: Any) -> bool:
     """Find the orbit of `turns` falls near the last return; False where none is found that the motion comes to.
 
     By Newton's method: the point moves by (I - M)⁻¹ (return - point).
@@ -137,7 +138,7 @@ def _closed(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
     for i in range(3):
         at[i] = s[0, i]
     for _ in range(_ROUNDS):
-        if not _once_around(p, tables, scratch, o):
+        if not _once_around(p, scratch, o):
             return False
         x, y, v_y = _solved(o, o.kept[0] - at[0], o.kept[1] - at[1], o.kept[2] - at[2])
         o.error = max(_sizes(o, x, y, v_y), TWO_PI * abs(o.late) / o.period)
@@ -159,7 +160,7 @@ def _closed(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
     o.away = _sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
     if not (_sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + _UNSURE * _CLOSED and was < _REACH):
         return False
-    return _measured(p, tables, scratch, o)
+    return _measured(p, scratch, o)
 
 
 @kernel(inline=False)
@@ -225,7 +226,7 @@ def _note_return(at: Floats, o: Any, fall: float) -> bool:
 
 
 @kernel(inline=False)
-def _tried(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
+def _tried(p: Plant, scratch: Floats, o: Any) -> bool:
     """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
     m = p.block
     o.phase = m.phase
@@ -233,7 +234,7 @@ def _tried(p: Plant, tables: Floats, scratch: Floats, o: Any) -> bool:
     for i in range(4):
         o.saved[i] = m.z[i]
     o.next_try = o.falls + _FIRST + (o.falls - o.next_try) // 2
-    if _closed(p, tables, scratch, o):
+    if _closed(p, scratch, o):
         o.on_orbit = 1
         return True
     _go_on(p, o)
@@ -263,7 +264,7 @@ def _follow(m: Any) -> None:
 
 
 @kernel(inline=False)
-def seek(p: Plant, tables: Floats, scratch: Floats, o: Any) -> int:
+def seek(p: Plant, scratch: Floats, o: Any) -> int:
     """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
     m = p.block
     if o.started == 0:
@@ -273,7 +274,7 @@ def seek(p: Plant, tables: Floats, scratch: Floats, o: Any) -> int:
         m.z[V_Y] = m.v_y
         m.knot = math.inf
         o.low = m.x
-        begin(p, tables, scratch)
+        begin(p, scratch)
         _follow(m)
         o.started = 1
         if _stays_linear(m, o):
@@ -283,7 +284,7 @@ def seek(p: Plant, tables: Floats, scratch: Floats, o: Any) -> int:
     for _ in range(_CALLS):
         if m.time >= o.duration or o.events > MOST_SMOOTH_EVENTS:
             return ENDED
-        ends = advance(p, tables, scratch, o.duration, True)
+        ends = advance(p, scratch, o.duration, True)
         for k in range(1, m.events + 1):
             o.way += _MANY ** m.word[k]
         o.events += m.events
@@ -298,7 +299,7 @@ def seek(p: Plant, tables: Floats, scratch: Floats, o: Any) -> int:
             o.low = min(o.low, min(m.begin[X], m.z[X]))
             continue
         part = extent.zero_of_velocity(p.exact, m)
-        if _note_return(p.exact.at, o, m.time + (part - m.part) * m.span) and _tried(p, tables, scratch, o):
+        if _note_return(p.exact.at, o, m.time + (part - m.part) * m.span) and _tried(p, scratch, o):
             return FOUND
         if _stays_linear(m, o):
             return LINEAR
@@ -306,7 +307,7 @@ def seek(p: Plant, tables: Floats, scratch: Floats, o: Any) -> int:
 
 
 @kernel(inline=False)
-def swing(p: Plant, tables: Floats, scratch: Floats, o: Any, seconds: float) -> None:
+def swing(p: Plant, scratch: Floats, o: Any, seconds: float) -> None:
     """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
 
     It ends early where the modes that are left can reach no further.
@@ -321,7 +322,7 @@ def swing(p: Plant, tables: Floats, scratch: Floats, o: Any, seconds: float) -> 
     extent.begin(m)
     ends = TURNED
     while ends in (TURNED, LONG):
-        ends = advance(p, tables, scratch, seconds, True)
+        ends = advance(p, scratch, seconds, True)
         o.low = min(o.low, m.low[X])
         o.high = max(o.high, m.high[X])
         _bound(m, o, seconds)

@@ -2,9 +2,9 @@
 
 A phase is a side of the friction law, stick or slip in one direction, on a pad that may touch the wheel; or it is
 flight, in which the pad is clear of the wheel. A margin is positive while the phase lasts, and the first one that
-runs out is the event that ends it. Two loops carry a motion through a phase and find that event: `motion.advance`,
-by matrix exponentials on smooth pads and by Runge-Kutta steps on rough ones of branches, and that of
-`schemes.event_driven` on any pads. What both of them do at an event stands here.
+runs out is the event that ends it. Two propagators carry a motion through a phase and find that event: matrix
+exponentials on smooth pads (`advance`), and Runge-Kutta steps on any, which keep a tolerance (`steps`) or lie on a
+grid (`grid`). What all do at an event stands in `events`.
 """
 
 from brakecli.solver.double_double import two_sum

@@ -1,7 +1,6 @@
 """A motion and what is carried along with it, and the matrices that propagate it exactly on smooth pads."""
 
 from brakecli.solver.records import record
-from brakecli.solver.runge_kutta import USED
 
 X, Y, V_X, V_Y, BELT, BELT_SLOPE, LOAD, LOAD_SLOPE = range(8)
 """Components of a motion: its state, then U, Q and their slopes."""
@@ -21,8 +20,12 @@ MOST_EVENTS = 256
 """Events of a span; one with more of them is given up."""
 MOST_SMOOTH_EVENTS = 60
 """The same on smooth pads."""
-RUNGE_STAGES = int(USED[1])
-"""Stages of a Runge-Kutta step, DOPRI5."""
+RUNGE_STAGES = 6
+STAGES = 16
+POWERS = 7
+POWERED = 5
+"""Stages of a step of DOPRI5, and of any Runge-Kutta step; coefficients of its continuous solution; works that it
+adds up."""
 BANDS = 2
 MOST_TURNS = 6
 """Bands of v_x, and falls of v_x through zero in a cycle, at most."""
@@ -139,21 +142,38 @@ PURSUIT = record(
 """A motion on its way to its orbit, and what is measured there."""
 
 RUNGE = record(
+    "tolerance",  # error of a step, relative to the largest value so far
+    "step",  # to try next, s
+    "longest",  # that a step may be, s
+    "length",  # of the step that the continuous solution belongs to, s
+    "base time",  # when that began, as in the block, s
+    "lowest",  # what the margin of slip or stick falls to in the last step, and rises again
+    "pressed_x pressed_y pressed",  # where full contact has been computed in this step, and its force, N
     "grid",  # step of the grid, s
-    "force slope touching",  # contact at the begin of the step, as in `motion.cells`
     "least_slide least_hold least_pass",  # see `rough.Margins`
     "least_contact most_contact",  # part of the pad that touches
     "open",  # time in which nothing touches, s
+    on_grid=int,  # 1 where steps lie on a grid, 0 where they keep a tolerance
+    pair=int,  # 0: steps of order eight, 1: of order five
+    light=int,  # 1 where the contact finds the force alone
+    steeply=int,  # 1 where the contact's derivative by x is asked for
+    level=int,  # number of the sample interval that has been reached
+    switches=int,  # changes of phase without a step in between
     steps=int,  # of the grid
     w=(float, 4),  # state or column at a stage
+    outside=(float, SIZE - BELT),  # speed, load and their slopes at the begin of the step
+    begin=(float, 4),  # both ends of the step
     end=(float, 4),
-    end_columns=(float, (COLUMNS, 4)),
-    k=(float, (RUNGE_STAGES, 4)),  # rates of the state at the stages
-    k_columns=(float, (RUNGE_STAGES, COLUMNS, 4)),
-    rates=(float, 4),  # of the state where the contact was evaluated last for margins
-    first_margin=(float, 2),  # at the begin of the step and at its end, and rates of both; in slip m/s, in stick N
-    first_rate=(float, 2),
-    margin=(float, 2),
-    margin_rate=(float, 2),
+    rates=(float, 4),  # slopes of the continuous solution, m and m/s
+    slopes=(float, (STAGES, 4)),  # rates of the state at the stages
+    k_columns=(float, (RUNGE_STAGES, 4)),  # and of a column
+    touch=(float, (STAGES, 3)),  # F_y (N), -∂F_y/∂y and ∂F_y/∂x (N/m) there
+    stores=(float, STAGES),  # energy of the contact, J, unless it is found without
+    powers=(float, (POWERS, 4)),  # coefficients of the continuous solution
+    work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W
+    margin=(float, MARGINS),  # of the phase, m, m/s or N, and their rates
+    margin_rate=(float, MARGINS),
+    first_margin=(float, MARGINS),  # at the begin of the step
+    first_rate=(float, MARGINS),
 )
 """A Runge-Kutta step."""

@@ -23,11 +23,11 @@ from brakecli import stop
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import aligned
 from brakecli.solver.double_double import two_product
-from brakecli.solver.motion import advance as ends
+from brakecli.solver.motion import events as ends
 from brakecli.solver.motion.cells import EIGHT, FOUR
 from brakecli.solver.motion.phases import STICK
 from brakecli.solver.motion.record import BELT, LOAD
-from brakecli.solver.motion.tasks import FLY, advance
+from brakecli.solver.motion.tasks import FLY, step
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
 from brakecli.solver.roughness import Surface, wheel_angles
@@ -137,7 +137,7 @@ class RoughFlow:
         m.count = 4 if tangents else 0
         m.seconds = span
         r.steps = steps
-        status = Status(advance(self._plants, self._tables, _NO_SCRATCH, _NO_ROWS, _NO_ROWS, 0))
+        status = Status(step(self._plants, self._tables, _NO_SCRATCH, _NO_ROWS, _NO_ROWS, 0))
         events = int(m.events)
         return Flown(
             status,
@@ -216,6 +216,10 @@ def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
     table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * steeper
     f["stiffness"] = system.contact_stiffness
     plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
+    plant.runge.on_grid = 1
+    plant.runge.pair = 1
+    plant.layer.pad.half_length = a
+    plant.layer.pad.k = system.layer_stiffness
     plant.block.z[BELT] = system.belt_speed
     plant.block.z[LOAD] = system.load_at_start
     f["half"] = 0.5 * system.layer_stiffness * cell

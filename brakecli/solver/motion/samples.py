@@ -4,7 +4,8 @@ from brakecli.solver.arrays import Floats
 from brakecli.solver.friction import observed
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import columns, exact
-from brakecli.solver.motion.advance import DONE, LONG, STALLED, advance, begin, pass_knot
+from brakecli.solver.motion.advance import advance, begin
+from brakecli.solver.motion.events import DONE, LONG, STALLED, pass_knot
 from brakecli.solver.motion.phases import CONE, OPEN, STICK, carried, side_of
 from brakecli.solver.motion.record import BELT, SIZE, V_X, V_Y, X, Y
 from brakecli.solver.plant import Plant
@@ -17,7 +18,7 @@ _NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVER
 
 
 @kernel(inline=False)
-def _start(p: Plant, tables: Floats, scratch: Floats) -> None:
+def _start(p: Plant, scratch: Floats) -> None:
     """Find the phase of the initial state."""
     m = p.block
     p.exact.stiffness = 2.0 * p.layer.pad.half_length * p.layer.pad.k
@@ -33,10 +34,19 @@ def _start(p: Plant, tables: Floats, scratch: Floats) -> None:
     if p.tangent.on == 1:
         m.count = 2
     pass_knot(p, scratch, 0.0)
-    begin(p, tables, scratch)
+    begin(p, scratch)
     m.started = 1
     if p.track.on == 1:
         p.track.phase = m.phase
+
+
+@kernel(inline=False)
+def mark_at(p: Plant, number: int, store: float) -> None:
+    """Make a mark where the motion is, with the energy of its contact (J)."""
+    m = p.block
+    at = p.track.states[mark(p.track, p.work, number, p.grid.samples, m.base + m.time, store)]
+    for i in range(4):
+        at[i] = m.z[i]
 
 
 @kernel(inline=False)
@@ -44,27 +54,39 @@ def _mark(p: Plant, number: int) -> None:
     """Make a mark at a sample."""
     m = p.block
     exact.add_works(p.c, p.exact, m, p.work)
-    store = 0.5 * p.exact.stiffness * m.z[Y] * m.z[Y] if m.phase != OPEN else 0.0
-    at = p.track.states[mark(p.track, p.work, number, p.grid.samples, m.base, store)]
-    for i in range(4):
-        at[i] = m.z[i]
+    mark_at(p, number, 0.5 * p.exact.stiffness * m.z[Y] * m.z[Y] if m.phase != OPEN else 0.0)
 
 
 @kernel
-def _renew(p: Plant, number: int) -> None:
-    """Note the growth of the disturbance up to a sample."""
+def renew_disturbance(p: Plant, number: int) -> None:
+    """Note the growth of the disturbance, the last column, up to a sample."""
     t = p.tangent
-    m = p.block
+    w = p.block.columns[p.block.count - 1]
     if number > 0:
-        t.x = m.columns[1, X]
-        t.y = m.columns[1, Y]
-        t.v_x = m.columns[1, V_X]
-        t.v_y = m.columns[1, V_Y]
+        t.x = w[X]
+        t.y = w[Y]
+        t.v_x = w[V_X]
+        t.v_y = w[V_Y]
     renew(t, number, p.grid.samples)
-    m.columns[1, X] = t.x
-    m.columns[1, Y] = t.y
-    m.columns[1, V_X] = t.v_x
-    m.columns[1, V_Y] = t.v_y
+    w[X] = t.x
+    w[Y] = t.y
+    w[V_X] = t.v_x
+    w[V_Y] = t.v_y
+
+
+@kernel
+def put_sample(p: Plant, w: Floats, phase: int, normal: float, fraction: float, needed: float) -> None:
+    """Put a sample into the state: the motion w with its forces (N); `needed` is what it takes to stick."""
+    m = p.block
+    bound = p.c.phi * normal
+    holds = phase == STICK and abs(needed) <= bound * CONE
+    state, friction = observed(side_of(phase), holds, needed, normal, bound)
+    for i in range(4):
+        m.row[i] = w[i]
+    m.row[4] = friction
+    m.row[5] = normal
+    m.row[6] = fraction
+    m.row[7] = state
 
 
 @kernel
@@ -72,7 +94,6 @@ def _sample(p: Plant, scratch: Floats) -> None:
     """Put the sample at the level reached into the state; in stick the shoe is carried along without drift."""
     m = p.block
     z = m.z
-    c = p.c
     columns.hold_on(m)
     needed = 0.0
     if m.phase == STICK:
@@ -85,18 +106,12 @@ def _sample(p: Plant, scratch: Floats) -> None:
     for i in range(4):
         m.worst[i] = max(m.worst[i], abs(m.columns[0, i]))
         m.largest[i] = max(m.largest[i], abs(z[i]))
-        m.row[i] = z[i]
     normal = max(-p.exact.stiffness * z[Y], 0.0) if m.phase != OPEN else 0.0
-    holds = m.phase == STICK and abs(needed) <= c.phi * normal * CONE
-    state, friction = observed(side_of(m.phase), holds, needed, normal, c.phi * normal)
-    m.row[4] = friction
-    m.row[5] = normal
-    m.row[6] = 1.0 if normal > 0.0 else 0.0
-    m.row[7] = state
+    put_sample(p, z, m.phase, normal, 1.0 if normal > 0.0 else 0.0, needed)
 
 
 @kernel(inline=False)
-def sampled(p: Plant, tables: Floats, scratch: Floats, rows: Floats, stop: int) -> int:
+def sampled(p: Plant, scratch: Floats, rows: Floats, stop: int) -> int:
     """Step from the level reached to that of a later sample, filling `rows` with those before it; a `Failure`."""
     m = p.block
     counts = p.counts
@@ -104,14 +119,14 @@ def sampled(p: Plant, tables: Floats, scratch: Floats, rows: Floats, stop: int) 
     failure = _NONE
     row = 0
     if m.started == 0:
-        _start(p, tables, scratch)
+        _start(p, scratch)
     number = counts.level // grid.per_sample
     while True:
         m.base = grid.interval * number
         m.time = 0.0
         _sample(p, scratch)
         if p.tangent.on == 1:
-            _renew(p, number)
+            renew_disturbance(p, number)
         if p.track.on == 1 and number >= p.track.next:
             _mark(p, number)
         if counts.level >= stop:
@@ -119,9 +134,9 @@ def sampled(p: Plant, tables: Floats, scratch: Floats, rows: Floats, stop: int) 
         for column in range(8):  # a slice would take seconds to compile
             rows[row, column] = m.row[column]
         row += 1
-        ends = advance(p, tables, scratch, grid.interval, False)
+        ends = advance(p, scratch, grid.interval, False)
         while ends == LONG and not stopped(p.layer.pad.signals):
-            ends = advance(p, tables, scratch, grid.interval, False)
+            ends = advance(p, scratch, grid.interval, False)
         if ends == STALLED:
             failure = _STALLED
         if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:

@@ -1,10 +1,13 @@
-"""What Python has a motion do: one entry, as each has the loop compiled again."""
+"""What Python has a motion do: an entry for each propagator, as each has its loop compiled again."""
 
 from typing import Any
 
 from brakecli.solver.arrays import ROWS, VECTOR, Floats
 from brakecli.solver.kernels import entry
-from brakecli.solver.motion.advance import DONE, fly
+from brakecli.solver.motion.advance import fly
+from brakecli.solver.motion.between import sampled_between
+from brakecli.solver.motion.events import DONE
+from brakecli.solver.motion.grid import fly_on_grid
 from brakecli.solver.motion.orbit import seek, swing
 from brakecli.solver.motion.samples import sampled
 from brakecli.solver.plant import PLANT
@@ -15,14 +18,23 @@ SAMPLE, FLY, SEEK, SWING = range(4)
 
 @entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
 def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int) -> int:
-    """Do the task of the block, which takes `seconds` or goes to the level `stop`; how it ends."""
+    """Do the task of the block by exact propagation, for `seconds` or to the level `stop`; how it ends."""
     p = plants[0]
     task = p.block.task
     if task == SAMPLE:
-        return sampled(p, tables, scratch, rows, stop)
+        return sampled(p, scratch, rows, stop)
     if task == FLY:
-        return fly(p, tables, scratch, p.block.seconds, p.block.count)
+        return fly(p, scratch, p.block.seconds, p.block.count)
     if task == SEEK:
-        return seek(p, tables, scratch, p.way)
-    swing(p, tables, scratch, p.way, p.block.seconds)
+        return seek(p, scratch, p.way)
+    swing(p, scratch, p.way, p.block.seconds)
     return DONE
+
+
+@entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
+def step(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int) -> int:
+    """Do the task of the block by Runge-Kutta steps: `SAMPLE` or `FLY`."""
+    p = plants[0]
+    if p.block.task == SAMPLE:
+        return sampled_between(p, tables, scratch, rows, stop)
+    return fly_on_grid(p, tables, scratch, p.block.seconds)

@@ -1,17 +1,16 @@
-"""The first event in a step: which margin of the phase runs out, and where, on the continuous solution."""
+"""The first event in a step that keeps a tolerance: which margin runs out, where on the continuous solution."""
 
 import math
 
-from brakecli.solver.arrays import Floats
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
+from brakecli.solver.motion.forces import NEAR, find_margins, rounding
+from brakecli.solver.motion.locate import NO_EVENT
 from brakecli.solver.motion.phases import HEIGHT, OPEN, SOONER, STICK, side_of
-from brakecli.solver.motion.record import V_X, Y
+from brakecli.solver.motion.record import BELT, BELT_SLOPE, MARGINS, V_X, V_Y, Y
+from brakecli.solver.motion.tableaus import interpolated, interpolated_both, reach
 from brakecli.solver.plant import Plant
-from brakecli.solver.runge_kutta import reach
-from brakecli.solver.schemes.event_driven.phases import NEAR, margins, rounding
 
-NONE = -1
 LOOKS = 8
 """Places of a step at which the margins are looked at; a step is at most two radians of the fastest motion."""
 
@@ -32,27 +31,53 @@ _FALLS = 7.0
 """Rise², over bend and height in the middle, beyond which a parabola falls to an eighth of that: it falls by
 rise² / (8 bend), and 8 (1 - 1/8) = 7."""
 
+Margins = tuple[float, float, float]
+
+
+@kernel(inline=False)
+def margins(p: Plant, theta: float) -> Margins:
+    """The margins of the phase at the part theta of the step."""
+    m = p.block
+    r = p.runge
+    acceleration = 0.0
+    r.w[Y] = interpolated(r, Y, theta)
+    if m.phase == STICK:
+        since = theta * r.length
+        r.w[0] = m.z[0] + (m.z[BELT] + 0.5 * m.z[BELT_SLOPE] * since) * since
+        r.w[V_X] = m.z[BELT] + m.z[BELT_SLOPE] * since
+        r.w[V_Y], slope = interpolated_both(r, V_Y, theta)
+        acceleration = slope / r.length
+    elif m.phase != OPEN:
+        r.w[V_X] = interpolated(r, V_X, theta)
+    find_margins(p, r.w, acceleration, theta * r.length)
+    return r.margin[0], r.margin[1], r.margin[2]
+
 
 @kernel
-def _allowances(p: Plant) -> tuple[float, float, float]:
-    """How far each margin may be below zero by rounding alone."""
-    m = p.motion
-    height = ROUNDING * (abs(m.y) + p.layer.pad.clear_from)
+def _allowances(p: Plant) -> Margins:
+    """How far each margin may be below zero by rounding alone.
+
+    The acceleration along y is rounded as its velocity is, over the step.
+    """
+    m = p.block
+    r = p.runge
+    height = ROUNDING * (abs(m.z[Y]) + p.layer.pad.clear_from)
     if m.phase != STICK:
-        late = abs(m.belt_slope) * (m.time + m.tau)  # the wheel's velocity at a time that is rounded
-        return height, ROUNDING * (abs(m.v_x) + abs(m.belt) + late), 0.0
+        late = abs(m.z[BELT_SLOPE]) * (m.base + m.time)  # the wheel's velocity at a time that is rounded
+        return height, ROUNDING * (abs(m.z[V_X]) + abs(m.z[BELT]) + late), 0.0
     along, _ = rounding(p)
+    along += p.c.phi * p.c.m * ROUNDING * max(abs(m.z[V_Y]), abs(r.end[V_Y])) / r.length
     return height, 2.0 * along, 2.0 * along
 
 
 @kernel(inline=False)
-def _root(p: Plant, tables: Floats, scratch: Floats, which: int, h: float, left: float, right: float) -> float:
+def _root(p: Plant, which: int, left: float, right: float) -> float:
     """Where a margin passes zero between left and right: the secant inside the bracket, halved if it lags.
 
     Near enough for Newton's iteration on the true motion to make it exact.
     """
-    low = margins(p, tables, scratch, h, left)[which]
-    high = margins(p, tables, scratch, h, right)[which]
+    low = margins(p, left)[which]
+    high = margins(p, right)[which]
     if low <= 0.0:
         return left
     place = left
@@ -64,7 +89,7 @@ def _root(p: Plant, tables: Floats, scratch: Floats, which: int, h: float, left:
         if abs(new - place) <= _NEAR * right or right - left <= _NEAR * right:
             return new
         place = new
-        value = margins(p, tables, scratch, h, place)[which]
+        value = margins(p, place)[which]
         if value > 0.0:
             left = place
             low = value
@@ -81,14 +106,12 @@ def _root(p: Plant, tables: Floats, scratch: Floats, which: int, h: float, left:
 
 
 @kernel(inline=False)
-def lowest(
-    p: Plant, tables: Floats, scratch: Floats, which: int, h: float, left: float, right: float
-) -> tuple[float, float]:
+def lowest(p: Plant, which: int, left: float, right: float) -> tuple[float, float]:
     """Where a margin is lowest between left and right, and its value; by the golden section, until below zero."""
     a = left + _GOLDEN * (right - left)
     b = right - _GOLDEN * (right - left)
-    at_a = margins(p, tables, scratch, h, a)[which]
-    at_b = margins(p, tables, scratch, h, b)[which]
+    at_a = margins(p, a)[which]
+    at_b = margins(p, b)[which]
     for _ in range(_GOLDEN_STEPS):
         if at_a < 0.0 or at_b < 0.0:
             break
@@ -97,32 +120,32 @@ def lowest(
             b = a
             at_b = at_a
             a = left + _GOLDEN * (right - left)
-            at_a = margins(p, tables, scratch, h, a)[which]
+            at_a = margins(p, a)[which]
         else:
             left = a
             a = b
             at_a = at_b
             b = right - _GOLDEN * (right - left)
-            at_b = margins(p, tables, scratch, h, b)[which]
+            at_b = margins(p, b)[which]
     return (a, at_a) if at_a < at_b else (b, at_b)
 
 
 @kernel(inline=False)
-def _depth(p: Plant, tables: Floats, scratch: Floats, which: int, h: float, root: float) -> float:
+def _depth(p: Plant, which: int, root: float) -> float:
     """How far below zero a margin would fall behind its root, if the phase went on: by a parabola; or infinity.
 
     With m_1 and m_2 at one and two distances before the root that is (2 m_1 - m_2/2)²/2(m_2 - 2 m_1).
     """
     apart = 0.5 * min(root, 2.0 * _APART)
-    one = margins(p, tables, scratch, h, root - apart)[which]
-    two = margins(p, tables, scratch, h, root - 2.0 * apart)[which]
+    one = margins(p, root - apart)[which]
+    two = margins(p, root - 2.0 * apart)[which]
     fall = 2.0 * one - 0.5 * two
     bend = two - 2.0 * one
     return 0.5 * fall * fall / bend if bend > 0.0 else math.inf
 
 
 @kernel(inline=False)
-def first_event(p: Plant, tables: Floats, scratch: Floats, h: float) -> tuple[int, float]:
+def crossing(p: Plant, h: float) -> tuple[int, float]:
     """The margin that runs out first and the part of the step at which it does; 0 where it never was positive.
 
     None does where the continuous solution cannot get that far from the begin of the step. A margin may also dip
@@ -130,22 +153,23 @@ def first_event(p: Plant, tables: Floats, scratch: Floats, h: float) -> tuple[in
     `near` to zero. How low it gets without an event is kept, and how far it would fall behind one, as the error of
     the motion may make an event of it, or none.
     """
-    m = p.motion
-    sliding = side_of(p.motion.phase) * (p.motion.begin[V_X] - p.motion.belt)
+    m = p.block
+    r = p.runge
+    sliding = side_of(m.phase) * (m.z[V_X] - m.z[BELT])
     near = 2.0 * NEAR * p.tangent.moved if p.tangent.knows == 1 else 0.0
-    far = reach(m, V_X) + abs(m.belt_slope) * h + near
-    m.lowest = math.inf
-    stays = abs(m.begin[Y] - p.layer.pad.clear_from) > reach(m, Y)
+    far = reach(r, V_X) + abs(m.z[BELT_SLOPE]) * h + near
+    r.lowest = math.inf
+    stays = abs(m.z[Y] - p.layer.pad.clear_from) > reach(r, Y)
     if stays and (m.phase == OPEN or (m.phase != STICK and sliding > far)):
-        return NONE, 1.0
+        return NO_EVENT, 1.0
     allowed = _allowances(p)
-    before_last = last = margins(p, tables, scratch, h, 0.0)
+    before_last = last = margins(p, 0.0)
     for look in range(1, LOOKS + 1):
         theta = look / LOOKS
-        found = NONE
+        found = NO_EVENT
         first = math.inf
-        now = margins(p, tables, scratch, h, theta)
-        for which in range(3):
+        now = margins(p, theta)
+        for which in range(MARGINS):
             left = (look - 1) / LOOKS
             right = 0.0
             dip = -1.0
@@ -158,12 +182,12 @@ def first_event(p: Plant, tables: Floats, scratch: Floats, h: float) -> tuple[in
                     left = theta
                     for _ in range(_SOUGHT):
                         left *= SOONER
-                        if margins(p, tables, scratch, h, left)[which] > allowed[which]:
+                        if margins(p, left)[which] > allowed[which]:
                             break
                     else:
                         return which, 0.0
             elif look == 1 and allowed[which] < last[which] <= now[which]:
-                dip = 0.0 if margins(p, tables, scratch, h, _BESIDE)[which] < last[which] else -1.0
+                dip = 0.0 if margins(p, _BESIDE)[which] < last[which] else -1.0
                 until = theta
             elif before_last[which] > last[which] <= now[which] and rise * rise > _FALLS * bend * (
                 last[which] - near
@@ -171,24 +195,24 @@ def first_event(p: Plant, tables: Floats, scratch: Floats, h: float) -> tuple[in
                 dip = theta - 2.0 / LOOKS
                 until = theta
             if right == 0.0 and dip < 0.0 and look == LOOKS and now[which] <= last[which]:
-                dip = left if margins(p, tables, scratch, h, 1.0 - _BESIDE)[which] < now[which] else -1.0
+                dip = left if margins(p, 1.0 - _BESIDE)[which] < now[which] else -1.0
                 until = theta
             if dip >= 0.0:
-                place, value = lowest(p, tables, scratch, which, h, dip, until)
+                place, value = lowest(p, which, dip, until)
                 if value < -allowed[which]:
                     left = dip
                     right = place
                 elif which != HEIGHT:
-                    m.lowest = min(m.lowest, value)
+                    r.lowest = min(r.lowest, value)
             if right > 0.0:
-                root = _root(p, tables, scratch, which, h, left, right)
+                root = _root(p, which, left, right)
                 if root < first:
                     found = which
                     first = root
-        if found != NONE:
+        if found != NO_EVENT:
             if found != HEIGHT:
-                m.lowest = min(m.lowest, _depth(p, tables, scratch, found, h, first))
+                r.lowest = min(r.lowest, _depth(p, found, first))
             return found, first
         before_last = last
         last = now
-    return NONE, 1.0
+    return NO_EVENT, 1.0

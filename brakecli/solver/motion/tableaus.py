@@ -13,7 +13,7 @@ import numpy as np
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
-from brakecli.solver.motions import POWERS, STAGES
+from brakecli.solver.motion.record import POWERS, STAGES
 
 END_STAGE = 12
 USED, LAST, TERMS, ORDER = np.array([[12, 6], [16, 13], [7, 4], [8, 5]])
@@ -96,99 +96,97 @@ DENSE[1, 0, [0, 2, 3, 4, 5, END_STAGE]] = (
 """The upper coefficients of the continuous solution."""
 
 
-@kernel
-def combined(m: Any, stage: int) -> tuple[float, float, float, float]:
-    """Σ A[stage, j] k_j of every component: what the step so far advances by, over the step."""
-    x = 0.0
-    y = 0.0
-    v_x = 0.0
-    v_y = 0.0
-    pair = m.pair
-    for j in range(stage if pair == 0 else min(stage, USED[pair])):
-        weight = A[pair, stage, j]
-        x += weight * m.slopes[j, 0]
-        y += weight * m.slopes[j, 1]
-        v_x += weight * m.slopes[j, 2]
-        v_y += weight * m.slopes[j, 3]
-    return x, y, v_x, v_y
+@kernel(inline=False)
+def combine(r: Any, begin: Floats, h: float, stage: int) -> None:
+    """The state at a stage of a step h: begin + h Σ A[stage, j] k_j."""
+    pair = r.pair
+    for i in range(4):
+        total = 0.0
+        for j in range(stage if pair == 0 else min(stage, USED[pair])):
+            total += A[pair, stage, j] * r.slopes[j, i]
+        r.w[i] = begin[i] + h * total
 
 
 @kernel
-def local_error(m: Any, component: int) -> float:
+def local_error(r: Any, component: int) -> float:
     """The error of one component in a step, over the step: of order seven, from those of order three and five.
 
     e_5²/√(e_5² + e_3²/100), each e a sum of weighted slopes; of DOPRI5 |e| itself.
     """
     third = 0.0
     fifth = 0.0
-    pair = m.pair
+    pair = r.pair
     for j in range(USED[pair]):
-        third += THIRD[pair, j] * m.slopes[j, component]
-        fifth += FIFTH[pair, j] * m.slopes[j, component]
+        third += THIRD[pair, j] * r.slopes[j, component]
+        fifth += FIFTH[pair, j] * r.slopes[j, component]
     if pair == 1:
-        return abs(fifth + FIFTH[1, END_STAGE] * m.slopes[END_STAGE, component])  # type: ignore[no-any-return]
+        return abs(fifth + FIFTH[1, END_STAGE] * r.slopes[END_STAGE, component])  # type: ignore[no-any-return]
     size = math.sqrt(fifth * fifth + 0.01 * third * third)
     return fifth * fifth / size if size > 0.0 else 0.0
 
 
 @kernel
-def make_continuous(m: Any, h: float) -> None:
+def make_continuous(r: Any, begin: Floats, h: float) -> None:
     """Coefficients of the continuous solution, from the slopes and both ends of a step h.
 
     p_0 is the change, p_1 = h k_first - p_0, p_2 = 2 p_0 - h (k_first + k_last), and the others are h Σ D k.
     """
-    pair = m.pair
+    pair = r.pair
+    r.length = h
     for i in range(4):
-        first = h * m.slopes[0, i]
-        last = h * m.slopes[END_STAGE, i]
-        change = m.end[i] - m.begin[i]
-        m.powers[0, i] = change
-        m.powers[1, i] = first - change
-        m.powers[2, i] = 2.0 * change - (first + last)
+        first = h * r.slopes[0, i]
+        last = h * r.slopes[END_STAGE, i]
+        change = r.end[i] - begin[i]
+        r.begin[i] = begin[i]
+        r.powers[0, i] = change
+        r.powers[1, i] = first - change
+        r.powers[2, i] = 2.0 * change - (first + last)
         for p in range(TERMS[pair] - 3):
             total = 0.0
             for j in range(LAST[pair]):
-                total += DENSE[pair, p, j] * m.slopes[j, i]
-            m.powers[p + 3, i] = h * total
+                total += DENSE[pair, p, j] * r.slopes[j, i]
+            r.powers[p + 3, i] = h * total
 
 
 @kernel
-def interpolated(m: Any, component: int, theta: float) -> float:
+def interpolated(r: Any, component: int, theta: float) -> float:
     """One component at the part theta of the step that the continuous solution belongs to.
 
     u = u_0 + θ (p_0 + (1 - θ) (p_1 + θ (p_2 + (1 - θ) (p_3 + …)))).
     """
     total = 0.0
     rest = 1.0 - theta
-    for p in range(TERMS[m.pair] - 1, -1, -1):
-        total = (total + m.powers[p, component]) * (theta if p % 2 == 0 else rest)
-    return m.begin[component] + total  # type: ignore[no-any-return]
+    for p in range(TERMS[r.pair] - 1, -1, -1):
+        total = (total + r.powers[p, component]) * (theta if p % 2 == 0 else rest)
+    return r.begin[component] + total  # type: ignore[no-any-return]
 
 
 @kernel
-def reach(m: Any, component: int) -> float:
+def reach(r: Any, component: int) -> float:
     """A bound of how far one component of the continuous solution gets from the begin of its step.
 
     |p_0| + |p_1|/4 + 4 |p_2|/27 + Σ |p_k|/16: the largest sizes of θ, θ(1 - θ), θ²(1 - θ), and of products of
     four.
     """
-    far = abs(m.powers[0, component]) + abs(m.powers[1, component]) / 4.0
-    far += abs(m.powers[2, component]) * 4.0 / 27.0
-    for p in range(3, TERMS[m.pair]):
-        far += abs(m.powers[p, component]) / 16.0
+    far = abs(r.powers[0, component]) + abs(r.powers[1, component]) / 4.0
+    far += abs(r.powers[2, component]) * 4.0 / 27.0
+    for p in range(3, TERMS[r.pair]):
+        far += abs(r.powers[p, component]) / 16.0
     return far  # type: ignore[no-any-return]
 
 
 @kernel
-def interpolated_both(m: Any, component: int, theta: float) -> tuple[float, float]:
+def interpolated_both(r: Any, component: int, theta: float) -> tuple[float, float]:
     """`interpolated`, and its derivative by theta."""
     total = 0.0
     slope = 0.0
     rest = 1.0 - theta
-    for p in range(TERMS[m.pair] - 1, -1, -1):
-        total += m.powers[p, component]
+    for p in range(TERMS[r.pair] - 1, -1, -1):
+        total += r.powers[p, component]
         if p % 2 == 0:
-            total, slope = total * theta, slope * theta + total
+            slope = slope * theta + total
+            total = total * theta
         else:
-            total, slope = total * rest, slope * rest - total
-    return m.begin[component] + total, slope
+            slope = slope * rest - total
+            total = total * rest
+    return r.begin[component] + total, slope
