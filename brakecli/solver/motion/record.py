@@ -173,7 +173,9 @@ RUNGE = record(
     work_rates=(float, (STAGES, POWERED)),  # powers of the energy account, W
     margin=(float, MARGINS),  # of the phase, m, m/s or N, and their rates
     margin_rate=(float, MARGINS),
-    first_margin=(float, MARGINS),  # at the begin of the step
+    first_margin=(float, MARGINS),  # at the begin of the step, or of a part of it
     first_rate=(float, MARGINS),
+    last_margin=(float, MARGINS),  # at the end of that part
+    last_rate=(float, MARGINS),
 )
 """A Runge-Kutta step."""
