@@ -1,8 +1,19 @@
 """The normal contact force, (2): one file and one row of `EVALUATORS` for each way of computing it.
 
-The rows are plain data; a file is imported when it is used.
+The rows are plain data; a file is imported when it is used. An evaluator keeps the contract `EvaluatorModule`.
 
-A module keeps the contract `EvaluatorModule`.
+1. Its kernel `evaluate` fills `layer.contact` for the shoe at (x, y): F_y, its derivatives, the part of the pad
+   that touches, the energy stored and its derivative by x.
+2. It changes nothing but the contact and the scratch up to the phases of the wheel's harmonics.
+3. These lie in the scratch from `layer.angles_at` on (`roughness.turn`); with a window there are none.
+4. On nodes heights are means over cells, with three cells beyond each end; they come from `heights.profiles`.
+5. Constants are in `layer.pad`, which says where in the tables each of them begins (`contact.pad`).
+6. It notes its place in `kinds()` as `contact.kind`, so that a run can say how contact was modelled.
+7. `valid` is 0 where its assumptions do not hold.
+8. `near` and `blur` say how far F_y can be from linear nearby, which may save an evaluation; both may be left.
+9. What it keeps in the scratch may save work, and changes results by rounding alone.
+10. It has a branch in `contact.force`, and may have a kernel `press` that finds normal force, stiffness, fraction,
+    kind and validity alone, for event-driven runs, with a branch in `motion.forces`.
 """
 
 from dataclasses import dataclass
@@ -15,22 +26,10 @@ if TYPE_CHECKING:
 
 @runtime_checkable
 class EvaluatorModule(Protocol):
-    """What every evaluator has.
-
-    It may also have a kernel `press` of the same signature, which finds normal force, stiffness, fraction, kind
-    and validity alone, for event-driven runs, with a branch in `motion.forces`.
-    """
+    """What every evaluator has."""
 
     def evaluate(self, x: float, y: float, layer: "Layer", tables: "Floats", scratch: "Floats", /) -> None:
-        """Fill `layer.contact` for the shoe at (x, y): a kernel, with a branch of its own in `contact.force`.
-
-        The phases of the wheel's harmonics lie in the scratch from `layer.angles_at` on (`roughness.turn`); on
-        nodes heights come from `heights.profiles`, and with a window there are no phases. Constants are in
-        `layer.pad`, which says where in the tables each of them begins. It changes nothing but the contact and the
-        scratch up to the phases, and notes its place in `kinds()`. `near` and `blur` say how far F_y can be from
-        linear nearby, which may save an evaluation; both may be left. What it keeps in the scratch may save work,
-        and change results by rounding alone.
-        """
+        """Fill `layer.contact` for the shoe at (x, y), in m: a kernel."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,18 @@
-"""The equations of motion themselves: phases, the first event in each, and a block of disturbances beside it.
+"""The equations of motion, carried through time by two propagators: matrices and Runge-Kutta steps.
 
-`advance` carries the block of a motion through time, whatever propagates it within a phase.
+A propagator carries the block of a motion (`record.BLOCK`) from event to event.
+
+1. The motion that is reached stands in `z`, with U, Q and their slopes, in the phase `phase`, at `base` + `time`.
+2. A step lies within a phase, and between two knots of speed and load.
+3. Margins (`phases`) are looked at inside a step as well: one that dips below zero is found, however short.
+4. A step ends at the first margin that runs out, `which`, located on the motion itself and not on a fit.
+5. It hands over to `events.pass_event`, and says there whether friction holds the shoe (`events.enter_phase`).
+6. It says how the margin falls, and the rates before and behind the event (`columns.jump`).
+7. It carries `count` small disturbances in `columns`, by the derivative of the motion or of its steps.
+8. In stick the shoe is where the wheel has carried its anchor, so that it does not drift.
+9. It adds works to `work` where `account` is 1, and notes turning points in `track` where that is on.
+10. A call ends after some thousand steps, and says how (`events.DONE`): all is in the record, to go on to the bit.
+
+A third one has a record in the plant, a branch beside `exact` in `events.enter_phase`, `events.look` and
+`columns.jump`, a loop as `advance`, `steps` and `grid` are, and an entry in `tasks`.
 """

@@ -1,7 +1,24 @@
 """Schemes: one file and one row of `SCHEMES` each. The rows are plain data; a file is imported when it is used.
 
-A module keeps one of the contracts below: `SteppingModule` where its steps are those of `solver.loop`, all of one
-length; `OwnStepsModule` where it finds its steps itself.
+1. A scheme names the record of its motion, `STATE`, which the plant has as `KEPT`, with x, y, v_x, v_y and force.
+2. It says how many levels its velocity lies behind its position (`LAG`), which fields of the state decide the next
+   ones (`MEMORY`), and which of these are velocities (`VELOCITIES`).
+3. It begins at a position with a velocity and an acceleration, at the level `LAG` (`begin`).
+4. It states the order of its error on smooth motion (`order`).
+5. It says when a step takes load, travel and contact (`weighted_time`).
+6. It places kinetic energy and that of the links where it keeps them, also for arrays (`mechanical_energy`).
+
+One whose steps are those of `solver.loop`, all of one length, keeps the contract `SteppingModule`:
+
+7. Its kernel `prepare` makes of a state the minimisation that a step comes down to.
+8. Its kernel `finish` makes the new state, with the previous position in `x_old` and `y_old`, and adds up the
+   works of the step; `work.scheme` gets the energy that the step itself takes out, so that the account closes.
+9. Both have a branch in `schemes.steps`.
+
+One that finds its steps itself keeps the contract `OwnStepsModule`:
+
+10. Its entry `advance` fills rows with the samples before a level, and may be called again from anywhere without
+    changing a bit; it notes works and events (`track`), growth and errors (`tangent`) where these are on.
 """
 
 from dataclasses import dataclass
