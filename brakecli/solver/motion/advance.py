@@ -10,7 +10,18 @@ from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import columns, exact, extent
-from brakecli.solver.motion.events import DONE, LONG, TURNED, anchor, enter_phase, look, pass_event, pass_knot, see
+from brakecli.solver.motion.events import (
+    DONE,
+    LONG,
+    TURNED,
+    anchor,
+    enter_phase,
+    look,
+    note_phase,
+    pass_event,
+    pass_knot,
+    see,
+)
 from brakecli.solver.motion.locate import NO_EVENT, first_event
 from brakecli.solver.motion.phases import OPEN, sliding_phase
 from brakecli.solver.motion.record import BELT, MARGINS, MOST_SMOOTH_EVENTS, SIZE, V_X, V_Y, Y
@@ -78,7 +89,9 @@ def _part_step(p: Plant, scratch: Floats, left: float) -> int:
     _note(p)
     if m.account == 1:
         exact.add_works(p.c, e, m, p.work)
-    return pass_event(p, scratch)
+    ends: int = pass_event(p, scratch)
+    note_phase(p, m.phase)
+    return ends
 
 
 @kernel(inline=False)

@@ -98,6 +98,14 @@ def pass_knot(p: Plant, scratch: Floats, t: float) -> None:
     )
 
 
+@kernel
+def note_phase(p: Plant, phase: int) -> None:
+    """Note the events with which a phase begins at the motion reached; without contact it is flight."""
+    m = p.block
+    if p.track.on == 1:
+        enter(p.track, phase, m.base + m.time, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y])
+
+
 @kernel(inline=False)
 def pass_event(p: Plant, scratch: Floats) -> int:
     """Enter the phase that follows the event at the end of the last step; how a call ends there, or `DONE`."""
@@ -110,8 +118,6 @@ def pass_event(p: Plant, scratch: Floats) -> int:
         m.z[Y] = p.layer.pad.clear_from if m.exact == 0 else 0.0
     enter_phase(p, following(m.phase, m.which, m.z[V_X] - m.z[BELT]))
     jumps = m.count == 0 or columns.jump(p)
-    if p.track.on == 1:
-        enter(p.track, m.phase, t, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y])
     anchor(p, scratch)
     columns.hold_on(m)
     look(p)

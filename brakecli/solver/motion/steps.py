@@ -11,7 +11,7 @@ from brakecli.solver.double_double import EPSILON
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import errors
 from brakecli.solver.motion.crossing import crossing
-from brakecli.solver.motion.events import STALLED, anchor, enter_phase, pass_event, pass_knot
+from brakecli.solver.motion.events import STALLED, anchor, enter_phase, note_phase, pass_event, pass_knot
 from brakecli.solver.motion.forces import act_first, renew
 from brakecli.solver.motion.locate import NO_EVENT
 from brakecli.solver.motion.phases import HEIGHT, OPEN, STICK, carried, sliding_phase
@@ -305,4 +305,5 @@ def step(p: Plant, tables: Floats, scratch: Floats) -> int:
         return _STALLED
     if m.which == HEIGHT:
         act_first(p, tables, scratch)
+    note_phase(p, m.phase if r.touch[0, 1] > 0.0 else OPEN)
     return _NONE
