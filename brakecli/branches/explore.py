@@ -316,9 +316,10 @@ class Explorer:
 
 
 def span(followed: Followed) -> tuple[float, float]:
-    """The least place and the largest one of a followed branch."""
-    assert followed.branch is not None
-    places = [point.p for point in followed.branch.points]
+    """The least place and the largest one of a followed branch: at its folds, where it turns there."""
+    branch = followed.branch
+    assert branch is not None
+    places = [point.p for point in branch.points] + [special.p for special in branch.specials]
     return min(places), max(places)
 
 

@@ -161,6 +161,19 @@ def test_the_windows_of_a_shoe_are_those_of_another_integrator(name: str) -> Non
         assert answer.windows[-1] == ((answer.value, upper) if lost else (lower, answer.value))
 
 
+@campaign
+@pytest.mark.parametrize("part", [1e-13, -2e-13])
+def test_rounding_moves_no_end_of_a_window_by_more_than_the_bars(part: float) -> None:
+    """A shoe that bounces, and the same with a change of its mass that is rounding, have the same ends."""
+    shoe = SHOES["doubling"]
+    changed = {**shoe["case"], "shoe": {"mass": shoe["case"]["shoe"]["mass"] * (1.0 + part)}}
+    key = shoe["key"].replace(".", "__")
+    one, other = (listed_ends(case, key, shoe["range"])[0] for case in (shoe["case"], changed))
+    errors = np.array(one.window_errors) + np.array(other.window_errors)
+    assert np.shape(one.windows) == np.shape(other.windows) == (2, 2)
+    assert np.all(np.abs(np.array(one.windows) - np.array(other.windows)) <= errors)
+
+
 def test_a_window_or_gap_narrower_than_both_its_bars_is_none() -> None:
     def left(*bounds: tuple[float, float]) -> list[float]:
         return [bound.p for bound in told_apart([Bound(*each) for each in bounds])]

@@ -1,5 +1,6 @@
 """The contact of a rough pad whose gap is straight in each cell."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -174,6 +175,42 @@ def _turn(f: Any, tables: Floats, place: float) -> None:
         turns[i] = -omega * sines[i]
     f.place = place
     f.known = 1
+
+
+@kernel(inline=False)
+def extreme_gap(f: Any, tables: Floats, place: float, y: float, everywhere: bool) -> tuple[float, float]:
+    """The gap f2 - f1 - y at a node, and the slope of f2 there: the least gap, zero where all begins to touch
+    `everywhere`, or the largest one, zero where something begins to touch.
+    """
+    n = f.width
+    at = f.nodes_at
+    if place != f.place or f.known == 0:
+        _turn(f, tables, place)
+    if f.known < 2:
+        _sum_waves(f, tables, tables[at : at + n], tables[at + n : at + 2 * n], f.sines_at)
+        f.known = 2
+    sign = -1.0 if everywhere else 1.0
+    most = -math.inf
+    node = 0
+    for j in range(f.half_cells + 1):
+        even = tables[at + j] - y
+        odd = tables[at + n + j]
+        one = sign * (even + odd - tables[f.shoe_at + j])
+        two = sign * (even - odd - tables[f.shoe_at + n + j])
+        if one > most:
+            most = one
+            node = j
+        if two > most:
+            most = two
+            node = -j
+    slope = 0.0
+    eights = (f.waves + EIGHT - 1) // EIGHT * EIGHT
+    rises = f.sines_at + 2 * eights
+    for i in range(f.waves):
+        wave = f.waves_at + 2 * n * i + abs(node)
+        sine = tables[wave] if node > 0 else -tables[wave]
+        slope += tables[rises + i] * tables[wave + n] + tables[rises + eights + i] * sine
+    return sign * most, slope
 
 
 @kernel(inline=False)

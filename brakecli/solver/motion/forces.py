@@ -153,6 +153,15 @@ def settle(p: Plant, stage: int, w: Floats, since: float) -> None:
     powers[4] = contact.store_x * sliding if r.light == 0 else contact.normal_force * v_y
 
 
+@kernel
+def find_again(p: Plant, stage: int) -> None:
+    """Make the contact of a stage the one found last."""
+    contact = p.layer.contact
+    contact.normal_force = p.runge.touch[stage, 0]
+    contact.stiffness = p.runge.touch[stage, 1]
+    contact.tangential = p.runge.touch[stage, 2]
+
+
 @kernel(inline=False)
 def act(p: Plant, tables: Floats, scratch: Floats, stage: int, since: float, w: Floats) -> None:
     """What acts at a state of the step, `since` its begin (s). In stick x and its velocity become the wheel's."""

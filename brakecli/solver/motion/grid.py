@@ -4,7 +4,9 @@ The grid does not depend on the state, so the end is a smooth function of the st
 parameters, as long as the sequence of phases is the same. An event divides a step of the grid into parts. It is
 found by the cubic through the margins at both ends and their rates, and located on steps that are tried.
 
-Lift-off is no event, because the normal force of a rough pad is continuous.
+Lift-off is no event, because the normal force of a rough pad is continuous. But it has a kink where the pad begins
+or ends to touch, somewhere or everywhere, and a kink divides a step, too. Its time depends on the state, and
+columns carry the derivative of that time, so that they are the derivative of the very steps that are taken.
 """
 
 import math
@@ -12,9 +14,10 @@ import math
 from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import columns, extent
+from brakecli.solver.motion.cells import extreme_gap
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.motion.events import DONE, INTERRUPTED, LOST, anchor, enter_phase, look, pass_event
-from brakecli.solver.motion.forces import find_margin_rates, find_margins, rate, resistance, touch
+from brakecli.solver.motion.forces import act, find_again, find_margin_rates, find_margins, rate, resistance, touch
 from brakecli.solver.motion.locate import NO_EVENT
 from brakecli.solver.motion.phases import HEIGHT, PULL, PUSH, SLIDING, STICK, side_of, sliding_phase
 from brakecli.solver.motion.record import (
@@ -23,24 +26,26 @@ from brakecli.solver.motion.record import (
     MARGINS,
     MOST_EVENTS,
     RUNGE_STAGES,
+    STAGES,
     V_X,
     V_Y,
     X,
     Y,
 )
 from brakecli.solver.motion.runge_kutta import advance_stages
-from brakecli.solver.motion.tableaus import END_STAGE, A
+from brakecli.solver.motion.tableaus import END_STAGE, NODES, A
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND
 
 _A = A[1, :RUNGE_STAGES, :RUNGE_STAGES].copy()
 _B = A[1, END_STAGE, :RUNGE_STAGES].copy()
+_C = NODES[1, :RUNGE_STAGES].copy()
 """DOPRI5, of order five. On 60 random rough pads its median error is a seventh of that of the classical method of
 order four at 160 evaluations of the contact to a period, and a fourth at 320. From 320 on DOP853 is worse than
 both, because the force of partial contact has kinks in its second derivative."""
 _ROUNDING = 1e-14  # of the terms of a margin: a margin that is negative by less is zero
-LANDING = 16  # parts of a step in which the whole pad lands or lifts off: the force has a kink there
-_STRETCHED = 1.5  # times the longest part, up to which the last one is stretched: none is shorter than half of it
+_FULL = 1.0 - 1e-9  # part of the pad that touches, from which on it touches everywhere
+_KINK = 1e-7  # of a step, to which it is known when the pad begins or ends to touch, somewhere or everywhere
 _SEEKS = 60  # steps of the search for an event
 _ABOVE = 0.75  # of a part at which a margin is negative, the middle of a bracket from its half on
 # of the rounding of a margin, and of a step: ends of that search
@@ -52,11 +57,15 @@ _SIGNALS = 1023
 
 
 @kernel
-def _rate_of(p: Plant, stage: int, w: Floats, found: Floats) -> None:
-    """`forces.rate` of a column: ∂F_y/∂x δx + ∂F_y/∂y δy takes the place of F_y. In stick δẍ = 0."""
+def _rate_of(p: Plant, stage: int, w: Floats, late: float, found: Floats) -> None:
+    """`forces.rate` of a column whose time is `late`: ∂F_y/∂x δ(x - Ut) + ∂F_y/∂y δy takes the place of F_y.
+
+    In stick δẍ = 0.
+    """
     c = p.c
     phase = p.block.phase
-    pressed = p.runge.touch[stage, 2] * w[X] - p.runge.touch[stage, 1] * w[Y]
+    touch_of = p.runge.touch[stage]
+    pressed = touch_of[2] * (w[X] - p.block.z[BELT] * late) - touch_of[1] * w[Y]
     along, across = resistance(c, 0.0, w[X], w[Y], w[V_X], w[V_Y])
     found[X] = w[V_X]
     found[Y] = w[V_Y]
@@ -76,23 +85,53 @@ def _step(p: Plant, tables: Floats, scratch: Floats, h: float, steeply: bool) ->
 
 
 @kernel(inline=False)
-def _carry(p: Plant, h: float) -> None:
-    """Move the columns along the step that has been made: w + h Σ B_s k_s, stages are at w + h Σ A_sr k_r."""
-    m = p.block
+def _carry(p: Plant, h: float, j: int) -> None:
+    """Move a column along the step that has been made, to `column`: w + h Σ B_s k_s + longer Σ B_s f_s.
+
+    Stages are at w + h Σ A_sr k_r + longer Σ A_sr f_r, where f are the rates of the state.
+    """
+    w = p.block.columns[j]
     r = p.runge
-    for j in range(m.count):
-        for s in range(RUNGE_STAGES):
-            for i in range(4):
-                total = 0.0
-                for q in range(s):
-                    total += _A[s, q] * r.k_columns[q, i]
-                r.w[i] = m.columns[j, i] + h * total
-            _rate_of(p, s, r.w, r.k_columns[s])
+    for s in range(RUNGE_STAGES + 1):
         for i in range(4):
             total = 0.0
-            for q in range(RUNGE_STAGES):
-                total += _B[q] * r.k_columns[q, i]
-            m.columns[j, i] += h * total
+            way = 0.0
+            for q in range(s):
+                weight = _A[s, q] if s < RUNGE_STAGES else _B[q]
+                total += weight * r.k_columns[q, i]
+                way += weight * r.slopes[q, i]
+            r.column[i] = w[i] + h * total + r.longer[j] * way
+        if s < RUNGE_STAGES:
+            _rate_of(p, s, r.column, r.late[j] + _C[s] * r.longer[j], r.k_columns[s])
+
+
+@kernel(inline=False)
+def _carry_all(p: Plant, tables: Floats, h: float, to_kink: bool) -> None:
+    """Move the columns along the step that has been made.
+
+    The time of a kink depends on the state: at each column the gap stays zero. So does that of an event, but there
+    all columns count at its time. The end of a step of the grid does not move.
+    """
+    m = p.block
+    r = p.runge
+    slope = 0.0
+    if to_kink:
+        _, slope = _gap(p, tables, h, r.end, _everywhere(p))
+    opens = slope * (r.end[V_X] - m.z[BELT]) - r.end[V_Y]
+    for j in range(m.count):
+        r.longer[j] = 0.0 if to_kink else -r.late[j]
+        if m.which != NO_EVENT:
+            for i in range(4):
+                m.columns[j, i] -= r.late[j] * r.slopes[0, i]
+            r.late[j] = 0.0
+            r.longer[j] = 0.0
+        elif to_kink and opens != 0.0:
+            _carry(p, h, j)
+            r.longer[j] = (r.column[Y] - slope * (r.column[X] - m.z[BELT] * r.late[j])) / opens
+        _carry(p, h, j)
+        for i in range(4):
+            m.columns[j, i] = r.column[i]
+        r.late[j] += r.longer[j]
 
 
 @kernel(inline=False)
@@ -217,17 +256,96 @@ def _note_contact(p: Plant, touching: float) -> None:
     r.most_contact = max(r.most_contact, part)
 
 
+@kernel
+def _touches(p: Plant, stage: int) -> int:
+    """How the pad touches: 0 nowhere, 1 somewhere, 2 everywhere. The force has a kink where that changes."""
+    touching = p.runge.touch[stage, 1]
+    if touching == 0.0:
+        return 0
+    return 2 if touching >= _FULL * p.cells.stiffness else 1
+
+
+@kernel
+def _everywhere(p: Plant) -> bool:
+    """Whether what changes in the step that has been made is that the pad touches everywhere."""
+    before = _touches(p, 0)
+    return before == 2 or (before == 1 and p.runge.touch[END_STAGE, 1] > 0.0)
+
+
+@kernel(inline=False)
+def _gap(p: Plant, tables: Floats, since: float, z: Floats, everywhere: bool) -> tuple[float, float]:
+    """The gap of a state that is zero at a kink, and the slope of the wheel there."""
+    m = p.block
+    place = m.anchor if m.phase == STICK else z[X] - m.z[BELT] * (m.time + since)
+    return extreme_gap(p.cells, tables, place, z[Y], everywhere)
+
+
+@kernel(inline=False)
+def _kink(p: Plant, tables: Floats, scratch: Floats, h: float, high: float) -> float:
+    """The part of the step h just behind the first kink, by the Illinois method; it lies before the part `high`.
+
+    The step ends there: so the end of a flow is continuous where a kink passes from one step into the next.
+    """
+    r = p.runge
+    before = _touches(p, 0)
+    everywhere = _everywhere(p)
+    low = 0.0
+    above = _gap(p, tables, high * h, r.end, everywhere)[0]
+    for i in range(4):
+        r.w[i] = p.block.z[i]
+    below = _gap(p, tables, 0.0, r.w, everywhere)[0]
+    side = 0
+    for _ in range(_SEEKS):
+        if high - low <= 2.0 * _KINK:
+            break
+        share = below / (below - above) if below * above < 0.0 else 0.5
+        part = min(max(low + share * (high - low), low + _KINK), high - _KINK)
+        _step(p, tables, scratch, part * h, False)
+        gap = _gap(p, tables, part * h, r.end, everywhere)[0]
+        if _touches(p, END_STAGE) != before:
+            high = part
+            above = gap
+            below *= 0.5 if side == 1 else 1.0
+            side = 1
+        else:
+            low = part
+            below = gap
+            above *= 0.5 if side == -1 else 1.0
+            side = -1
+    return high
+
+
+@kernel(inline=False)
+def _smooth_until(p: Plant, tables: Floats, scratch: Floats, h: float) -> float:
+    """The part of the step h, which has been made, up to the first kink of the force; 1 where there is none."""
+    m = p.block
+    r = p.runge
+    before = _touches(p, 0)
+    if _touches(p, END_STAGE) != before:
+        return _kink(p, tables, scratch, h, 1.0)
+    for i in range(2):
+        r.w[i] = 0.5 * (m.z[i] + r.end[i]) + 0.125 * h * (m.z[V_X + i] - r.end[V_X + i])
+    act(p, tables, scratch, STAGES - 1, 0.5 * h, r.w)
+    find_again(p, END_STAGE)
+    if _touches(p, STAGES - 1) != before:
+        _step(p, tables, scratch, 0.5 * h, False)
+        if _touches(p, END_STAGE) != before:
+            return _kink(p, tables, scratch, h, 0.5)
+        _step(p, tables, scratch, h, m.count > 0)
+    return 1.0
+
+
 @kernel(inline=False)
 def _take(p: Plant, tables: Floats, scratch: Floats, left: float) -> None:
-    """Take a step of the grid, or the part of one that is left, up to an event at most."""
+    """Take what is left of a step of the grid, up to a kink of the force or an event at most."""
     m = p.block
     r = p.runge
     steeply = m.count > 0
-    h = left if left <= _STRETCHED * m.h else m.h
+    h = left
     _step(p, tables, scratch, h, steeply)
-    if m.h == r.grid and (r.touch[0, 1] == 0.0) != (r.touch[END_STAGE, 1] == 0.0):
-        m.h = r.grid / LANDING
-        h = left if left <= _STRETCHED * m.h else m.h
+    smooth = _smooth_until(p, tables, scratch, h)
+    if smooth < 1.0:
+        h = smooth * h
         _step(p, tables, scratch, h, steeply)
     m.old = m.phase
     m.which, part = _first_crossing(p, tables, scratch, h)
@@ -235,7 +353,7 @@ def _take(p: Plant, tables: Floats, scratch: Floats, left: float) -> None:
         h = part * h
         _step(p, tables, scratch, h, steeply)
     _note(p, h)
-    _carry(p, h)
+    _carry_all(p, tables, h, smooth < 1.0)
     for i in range(4):
         m.z[i] = r.end[i]
     m.time += h
@@ -272,6 +390,8 @@ def _begin(p: Plant, tables: Floats, scratch: Floats) -> None:
     m.events = 0
     p.cells.place = math.nan
     r.open = 0.0
+    for j in range(m.count):
+        r.late[j] = 0.0
     r.least_slide = math.inf
     r.least_hold = math.inf
     r.least_contact = math.inf
@@ -305,7 +425,6 @@ def fly_on_grid(p: Plant, tables: Floats, scratch: Floats, span: float) -> int:
     _begin(p, tables, scratch)
     rate(p, m.phase, m.z, 0.0, m.start)
     for n in range(r.steps):
-        m.h = r.grid
         until = (n + 1) * r.grid
         while until - m.time > _WHOLE * m.h:
             _take(p, tables, scratch, until - m.time)

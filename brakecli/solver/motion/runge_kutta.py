@@ -19,7 +19,7 @@ _LATE = 0.93
 """Allowed defect of a step over its allowed error, and the parts of the step where it is taken, between stages."""
 _DENSE_ROUNDING = 63.0
 """The continuous solution's slope there is rounded so many times more than the slopes of the stages."""
-_NEAR = 1e-3
+_NEAR = 1e-6
 """The last change of the end of a step by Newton's iteration, over the step: what is left is about its square."""
 _AGAIN = 8
 """Steps that are made to where an event is, at most."""
