@@ -184,8 +184,10 @@ def test_a_window_or_gap_narrower_than_both_its_bars_is_none() -> None:
     assert left((0.2, 0.002), (0.201, 0.003), (0.21, 0.001)) == [0.21]
 
 
-LOST = 60241
-"""A pad whose forced motion is lost at 4.5777 and at 4.7034, while one stable sheet goes on to a fold at 4.7175.
+LONG = 60267
+"""A pad whose branch of forced motions is longer than the budget of a search."""
+FOLDED = 60241
+"""A pad whose forced motion is stable up to 4.7175, behind many folds.
 
 So says a Runge-Kutta integrator of its own with Newton's method, with 600 and with 1,200 cells.
 """
@@ -193,13 +195,25 @@ So says a Runge-Kutta integrator of its own with Newton's method, with 600 and w
 
 @campaign
 def test_nothing_is_claimed_of_a_window_in_which_a_branch_is_lost() -> None:
-    tables, key, lower, upper, tolerance = opening(LOST, "opening")
+    tables, key, lower, upper, tolerance = opening(LONG, "opening")
     key = key.replace("__", ".")
     critical = Critical(parameter=key, lower=lower, upper=upper, tolerance=tolerance)
     answers = Answers(explored(critical, make(tables)).explored, None)
-    assert not answers.windows[0][1].known
-    assert not answers.windows[-1][0].known
+    assert not answers.windows[0][0].known
+    assert not answers.windows[-1][1].known
     assert on_waves(critical, answers).outcome is Outcome.UNDECIDED
+
+
+@campaign
+def test_a_branch_is_followed_through_many_folds() -> None:
+    tables, key, lower, upper, tolerance = opening(FOLDED, "opening")
+    critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper, tolerance=tolerance)
+    answer = on_waves(critical, Answers(explored(critical, make(tables)).explored, None))
+    assert answer.outcome is Outcome.FOUND
+    assert answer.value is not None
+    assert answer.error is not None
+    assert answer.value == pytest.approx(4.7175, abs=answer.error)
+    assert answer.error < 1e-3
 
 
 @campaign
