@@ -22,14 +22,15 @@ from brakecli.solver.energy import NOT_KEPT
 from brakecli.solver.integrate import Motion, OwnError, Work
 from brakecli.solver.kernels import load
 from brakecli.solver.lanes import advance
-from brakecli.solver.lanes.records import DISTURBED, LANE, LANES, PAIR, SHARED, STEPS, THETA_1, WAVES, Shared
+from brakecli.solver.lanes.records import LANE, LANES, SHARED, WAVES, Shared
+from brakecli.solver.lanes.steps import THETA_1
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.records import PARTS, new
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import Initial, System
-from brakecli.solver.tangent import FEWEST_SAMPLES, LEAST, MOST, Exponent, exponents
+from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponents
 
 LEFT = 1e-3
 """What the iteration may leave of the force of a step, over load and tolerance; Newton's leaves far less."""
@@ -57,8 +58,7 @@ def fits(system: System) -> Hashable | None:
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
     grid = system.interval, system.per_sample, system.samples
-    carried = system.tangents, system.start_error is None
-    return system.half_length, system.shoe, wheel, system.nodes, *grid, *carried
+    return system.half_length, system.shoe, wheel, system.nodes, *grid, system.tangents
 
 
 @lru_cache(maxsize=4)
@@ -84,16 +84,16 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
         "full_up_to": float(pad.full_up_to),
         "clear_from": float(pad.clear_from),
         "shoe_mean": float(pad.shoe_mean),
-        "waves": waves.ravel(),
+        "waves": waves.T,
     }
-    return numbers, table.ravel()
+    return numbers, table
 
 
 def run_together(systems: Sequence[System]) -> list[Motion | None]:
     """The motions of systems that fit together; None where one has to be solved alone.
 
-    Their energy is not accounted for. Where the systems ask for `tangents`, the motions have an exponent. Where
-    they have a `start_error`, the motions know their own error.
+    The motions know their own error; their energy is not accounted for. Where the systems ask for `tangents`, they
+    have an exponent.
     """
     firsts = range(0, len(systems), LANES)
     return [found for first in firsts for found in _run_lanes(list(systems[first : first + LANES]))]
@@ -105,46 +105,38 @@ def _run_lanes(systems: list[System]) -> list[Motion | None]:
     alike = systems[0]
     number = len(systems)
     o = filled([*systems, *systems[-1:] * (LANES - number)])
-    rows = np.zeros((LANES, len(HISTORY), alike.samples + 1))
+    rows = np.zeros((alike.samples + 1, len(HISTORY), LANES))
     carried = alike.tangents and alike.samples >= FEWEST_SAMPLES
     sizes = np.ones((PARTS if carried else 0, LANES))
-    advance(o, *shared(alike, DISTURBED if alike.start_error is None else STEPS, DISTURBED + carried), rows, sizes)
+    advance(o, *shared(alike), rows, sizes)
+    histories = np.ascontiguousarray(rows.T)
     exponents = _exponents(sizes, alike.sampled_duration) if carried else repeat(None)
     seconds = (time.perf_counter() - begin) / number
     motions = list[Motion | None]()
     for n, (system, exponent) in enumerate(zip(systems, exponents, strict=False)):
-        steps = system.steps
-        closed = int(o.closed[n])
-        kinds = {kind: count for kind, count in (("closed-form", closed), ("midpoint", steps - closed)) if count}
-        work = Work(steps=steps, contact_evaluations=int(o.evaluations[n]), evaluators=kinds)
-        work.solve_seconds = seconds
+        evaluations = int(o.evaluations[n])
+        work = Work(steps=system.steps, contact_evaluations=evaluations, solve_seconds=seconds)
         own = OwnError(o.worst[None, :, :, n], 0.0 if o.unsure[n] else math.inf, None)
-        known = own if system.start_error else None
-        motions.append(Motion(system, rows[n].T, work, NOT_KEPT, exponent, own=known) if o.out[n] == 0.0 else None)
+        motion = Motion(system, histories[n].T, work, NOT_KEPT, exponent, own=own)
+        motions.append(motion if o.alive[n] else None)
     return motions
 
 
 def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
     """The exponents of all lanes; they mean nothing where a lane is out."""
     with np.errstate(invalid="ignore"):
-        return exponents(np.log(np.clip(sizes, LEAST, MOST)), duration)
+        return exponents(np.log(sizes), duration)
 
 
-def shared(system: System, first: int, beyond: int) -> tuple[Shared, Floats]:
-    """What a system has in common with others beside it, where the kinds from `first` on are carried along.
-
-    The second are its tables, with room for the gaps.
-    """
+def shared(system: System) -> tuple[Shared, Floats, Floats]:
+    """What a system has in common with others beside it, its table, and room for the gaps."""
     made = new(SHARED)
     values, table = _tables(system.half_length, system.shoe, system.wheel, system.nodes)
-    values = values | {"h": system.step, "interval": system.interval, "per_sample": system.per_sample}
-    values |= {"nodes": system.nodes, "first": first, "beyond": beyond, "gaps_at": table.size}
-    values["signals"] = np.frombuffer(stop.memory, np.uint8).ctypes.data
+    values = values | {"h": system.step, "rate": 1.0 / system.step, "per_sample": system.per_sample}
+    values |= {"nodes": system.nodes, "signals": np.frombuffer(stop.memory, np.uint8).ctypes.data}
     for name, value in values.items():
         made[name] = value
-    tables = aligned(table.size + PAIR * (system.nodes // 2 + 3))
-    tables[: table.size] = table
-    return made, tables
+    return made, table, aligned(LANES * (system.nodes + 6)).reshape(-1, 2 * LANES)
 
 
 def filled(systems: Sequence[System]) -> Any:
@@ -167,28 +159,32 @@ def filled(systems: Sequence[System]) -> Any:
     factor = 2.0 * THETA_1 * h * 2.0 * systems[0].half_length * k * moves / a  # whichever part touches
     allowed = LEFT * np.array([each.method.tolerance for each in systems]) * np.abs(load)
     o = aligned(LANE.itemsize // 8).view(LANE)[0]
-    values = {**c._asdict(), "load": load, "belt": belt, "k": k, "side": side, "grip": grip}
+    values = {**c._asdict(), "belt": belt, "k": k, "side": side, "grip": grip}
     values |= {"i_11": a_22 / a, "i_12": -a_12 / a, "i_22": a_11 / a, "limit": allowed * (1.0 - factor) / factor}
     values["answer"] = 2.0 * THETA_1 * h * 2.0 * systems[0].half_length * k * (a_11 - a_12 * grip) / a
-    values |= dict(zip(("x_old", "y_old", "d", "e"), start, strict=True))
-    values["out"] = ~(factor < _CONTRACTION) | np.isnan(start[0])
+    values |= {"at_x": start[0], "at_y": start[1], "alive": (factor < _CONTRACTION) & ~np.isnan(start[0])}
     for name, value in values.items():
         o[name] = value
-    o.rate[: len(wheel.g)] = np.outer(wheel.turns, belt)
-    if systems[0].start_error is not None:
-        o.t_x[STEPS], o.t_y[STEPS] = np.transpose([each.start_error for each in systems])
-        o.t_x_old[STEPS], o.t_y_old[STEPS] = o.t_x[STEPS], o.t_y[STEPS]
-    if systems[0].tangents:
-        _seed(o, np.sqrt((c.c_xx + c.c_yy + 2.0 * systems[0].half_length * k) / c.m), h)
+    o.motion.x, o.motion.y, o.motion.d, o.motion.e = start
+    for levels in o.motion, o.coarse:
+        levels.source_x = -load * c.sin_beta
+        levels.source_y = -load * c.cos_beta
+    o.turns[: len(wheel.g)] = np.outer(wheel.turns, belt)
+    error = o.by_steps
+    error.x, error.y = np.transpose([each.start_error or (0.0, 0.0) for each in systems])
+    error.x_old = error.x
+    error.y_old = error.y
+    _seed(o.disturbed, np.sqrt((c.c_xx + c.c_yy + 2.0 * systems[0].half_length * k) / c.m), h)
     return o
 
 
-def _seed(o: Any, rate: Floats, h: float) -> None:
+def _seed(disturbed: Any, rate: Floats, h: float) -> None:
     """Begin with disturbances as `tangent.seed` does; the forces of their first levels know nothing of them."""
-    o.t_x[DISTURBED] = o.t_y[DISTURBED] = 0.5 / rate
-    o.t_d[DISTURBED] = o.t_d_old[DISTURBED] = 0.5
-    o.t_e[DISTURBED] = o.t_e_old[DISTURBED] = -0.5
-    o.t_x_old[DISTURBED], o.t_y_old[DISTURBED] = o.t_x[DISTURBED] - 0.5 * h, o.t_y[DISTURBED] + 0.5 * h
+    disturbed.x = disturbed.y = 0.5 / rate
+    disturbed.d = disturbed.d_old = 0.5
+    disturbed.e = disturbed.e_old = -0.5
+    disturbed.x_old = disturbed.x - 0.5 * h
+    disturbed.y_old = disturbed.y + 0.5 * h
 
 
 def _start(system: System) -> tuple[float, float, float, float]:

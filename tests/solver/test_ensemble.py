@@ -82,7 +82,8 @@ def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
         assert exact.rows[:, 7].tolist() == alone.rows[:, 7].tolist()
         assert exact.work.steps == each.steps
         compared += 1
-        partly += exact.work.evaluators.get("midpoint", 0) > 100
+        touching = exact.rows[:, 6]
+        partly += int(((touching > 0.0) & (touching < 1.0)).mean() > 0.1)
     assert compared > 0.7 * lanes
     assert partly > 0.3 * compared
     assert (np.max(errors, axis=0) <= [5e-5, 1e-5]).all()

@@ -12,11 +12,10 @@ from scipy.linalg import expm
 from brakecli.runs.own_error import Known
 from brakecli.runs.together import SAFETY
 from brakecli.solver.arrays import Floats
-from brakecli.solver.ensemble import filled, fits, run_together, shared
+from brakecli.solver.ensemble import filled, run_together, shared
 from brakecli.solver.integrate import Motion, solve
-from brakecli.solver.lanes import _touch
-from brakecli.solver.lanes.carried import _leave_out
-from brakecli.solver.lanes.records import DISTURBED, LANES, Shared
+from brakecli.solver.lanes.contact import leave_out, touch
+from brakecli.solver.lanes.records import LANES, Shared
 from brakecli.solver.method import Method
 from brakecli.solver.system import System
 from tests.campaign import counts
@@ -39,10 +38,10 @@ def true_errors(run: Motion) -> np.ndarray:
     return np.asarray(np.abs(run.rows[:, :4] - exact).max(axis=0) / np.abs(exact).max(axis=0))
 
 
-def evaluate(o: Any, shared: Shared, tables: Floats) -> None:
+def evaluate(o: Any, shared: Shared, table: Floats, gaps: Floats) -> None:
     """The contact at `at_x` and `at_y` at t = 0, with what its nodes leave out; interpreted."""
-    _touch(o, shared, tables, 0.0)
-    _leave_out(o, shared, tables)
+    touch(o, shared, table, gaps, 0.0)
+    leave_out(o, gaps, shared.length / shared.nodes)
 
 
 def gaps(system: System, x: float, y: float) -> Floats:
@@ -74,7 +73,7 @@ def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
     each = system(nodes=64)
     rng = np.random.default_rng(11)
     found = list[tuple[float, float]]()
-    alike, tables = shared(each, DISTURBED, DISTURBED)
+    alike, table, gaps_at_nodes = shared(each)
     spacing = 2.0 * each.half_length / each.nodes
     for _ in range(20):
         o = filled([each] * LANES)
@@ -84,7 +83,7 @@ def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
             o.at_x[n] = x
             near = level[rng.choice([0, 1, 31, 32, 62, 63])]
             o.at_y[n] = rng.choice([rng.uniform(level.min(), level.max()), near + 1e-12, near - 1e-12])
-        evaluate(o, alike, tables)
+        evaluate(o, alike, table, gaps_at_nodes)
         for n, x in enumerate(places):
             gap = gaps(each, x, o.at_y[n])
             assert o.found[n] == pytest.approx(
@@ -143,18 +142,6 @@ def test_it_is_the_true_one(step: float, nodes: int, many: int) -> None:
     assert min(ratios) > 1.0 / SAFETY
     assert max(ratios) < 7.0
     assert 0.8 < float(np.median(ratios)) < 2.3
-
-
-def test_it_changes_nothing_of_the_motions() -> None:
-    rng = np.random.default_rng(8)
-    strangers = [drawn(rng, solver__duration=0.1) for _ in range(LANES)]
-    asking = [replace(each, start_error=(1e-12, 1e-12)) for each in strangers]
-    for quiet, found in zip(run_together(strangers), run_together(asking), strict=True):
-        assert (quiet is None) == (found is None)
-        if quiet is not None and found is not None:
-            assert found.rows.tobytes() == quiet.rows.tobytes()
-            assert quiet.own is None
-    assert fits(strangers[0]) != fits(asking[0])
 
 
 def test_it_does_not_depend_on_the_lanes_beside_it() -> None:

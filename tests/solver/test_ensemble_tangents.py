@@ -177,7 +177,7 @@ def test_few_samples_give_no_exponent_in_a_lane() -> None:
         assert (found.exponent is not None) is known
 
 
-def test_a_disturbance_that_vanishes_between_samples_begins_anew_in_a_lane() -> None:
+def test_a_disturbance_that_vanishes_between_samples_fades_as_fast_as_can_be_told_in_a_lane() -> None:
     """By dashpots near the critical damping, e^-800 in a sample interval of 1 s, beyond what a double holds."""
     each = shaken(1e-4, 64.0, output__sample_interval=1.0, **TINY)
     strong = each.coefficients._replace(b_xx=2e4, b_xy=0.0, b_yy=2e4, phi=0.0)
