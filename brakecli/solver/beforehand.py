@@ -28,6 +28,8 @@ from brakecli.solver import cache_folder, compiling
 from brakecli.solver.cache_folder import HOW, LAZY, MANIFEST, REMEDY
 
 CHILD = "child"
+OPTIMISATION = "1"
+"""How much Numba optimises: its default takes a fifth more time, and nothing runs faster."""
 """Its value in the processes that compile all of them."""
 ROOM = 30e6
 """Free bytes on a disk on which kernels are compiled beforehand; they take 6 million."""
@@ -266,7 +268,12 @@ def _places() -> list[str]:
 def _compiled(folder: Path, tell: compiling.Tell) -> str:
     """Have children compile all kernels; why they have not, or an empty text."""
     count = min(cores(), MOST_CHILDREN)
-    environment = {**os.environ, HOW: CHILD, "NUMBA_OPT": "1", cache_folder.BASE: str(folder.parent.parent)}
+    environment = {
+        **os.environ,
+        HOW: CHILD,
+        "NUMBA_OPT": OPTIMISATION,
+        cache_folder.BASE: str(folder.parent.parent),
+    }
     children: list[subprocess.Popen[bytes]] = []
     with tempfile.TemporaryFile() as said:
         try:

@@ -119,15 +119,23 @@ def folder() -> Path | None:
 
 
 @cache
+def _numba() -> Any:
+    """Numba. It optimises as it does for `beforehand`, which takes a tenth less memory than its default."""
+    os.environ.setdefault("NUMBA_OPT", beforehand.OPTIMISATION)
+    import numba
+
+    return numba
+
+
+@cache
 def _facts() -> dict[str, str]:
     """What kernels depend on beside their sources."""
     import llvmlite
-    import numba
     from llvmlite import binding
 
     return {
         "python": f"{sys.version} {sys.flags.optimize}",
-        "numba": numba.__version__,
+        "numba": _numba().__version__,
         "llvmlite": llvmlite.__version__,
         "processor": f"{binding.get_host_cpu_name()} {binding.get_host_cpu_features().flatten()}",
         "path": str(Path(__file__).parent),
@@ -210,7 +218,7 @@ def compiler() -> Any:
 @cache
 def _compiler() -> Any:
     """Numba, which knows how to read the byte of a signal."""
-    import numba
+    numba = _numba()
     from llvmlite import ir
     from numba.extending import intrinsic
     from numba.extending import overload as overload_of
