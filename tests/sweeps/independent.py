@@ -18,7 +18,7 @@ Floats = NDArray[np.float64]
 Tables = dict[str, Any]
 # of the pad; of a period of the fastest motion or passing wave
 CELLS = 200
-STEPS = 60
+STEPS = 90
 NEUTRAL = 1e-5  # damping ratio of the slowest motion that would stop what counts as no growth without dashpots
 
 
