@@ -58,6 +58,17 @@ def seed(t: Any, state: Any, h: float) -> None:
     state.y_old = state.y - h * state.v_y
 
 
+def _error_of_mean(rates: Floats) -> Floats:
+    """The standard error of the mean of n rates, each the difference of two means in a row.
+
+    Neighbours share one of these. Where growth is a random walk of variance 1 in a batch, a rate has the variance
+    2/3, and two neighbours the covariance 1/6: the mean has (3 n - 1)/3n² where s²/n is (2 n - 1)/3n².
+    """
+    n = len(rates)
+    found: Floats = rates.std(axis=0, ddof=1) * math.sqrt((3.0 * n - 1.0) / (2.0 * n - 1.0) / n)
+    return found
+
+
 def exponents(logs: Floats, duration: float) -> list[Exponent]:
     """The exponents in the second half of runs, with their standard errors.
 
@@ -71,7 +82,7 @@ def exponents(logs: Floats, duration: float) -> list[Exponent]:
     late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
     rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
     longer = np.diff(late.reshape(BATCHES // 2, 2, -1).mean(axis=1), axis=0) * (BATCHES / duration)
-    errors = np.maximum(*(each.std(axis=0, ddof=1) / math.sqrt(len(each)) for each in (rates, longer)))
+    errors = np.maximum(_error_of_mean(rates), _error_of_mean(longer))
     lined = sizes[len(sizes) // 8 :]
     places = (np.arange(len(lined)) - 0.5 * (len(lined) - 1)) * (duration / len(sizes))
     slopes = places @ lined / (places @ places)

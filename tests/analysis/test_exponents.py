@@ -60,5 +60,10 @@ def test_a_longer_run_has_an_exponent_within_the_errors(seed: int) -> None:
 
 @campaign
 def test_exponents_of_runs_mirror_images_and_longer_runs_agree_within_three_errors() -> None:
+    """An error comes of eight batches, so that more pairs than of a normal distribution are beyond three of them.
+
+    Of random walks 1.1 % of pairs are. One in a hundred draws of 90 triples has more than 9 (simulated with `exponents`).
+    How a chaotic shoe wanders hangs on the last digit of its start, which another processor rounds otherwise.
+    """
     wrong = {seed: count for seed in range(90) if (count := disagree(rough_shoe(seed)))}
-    assert sum(wrong.values()) <= 2, wrong  # of 270 pairs at most
+    assert sum(wrong.values()) <= 9, wrong

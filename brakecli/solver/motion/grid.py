@@ -45,7 +45,7 @@ order four at 160 evaluations of the contact to a period, and a fourth at 320. F
 both, because the force of partial contact has kinks in its second derivative."""
 _ROUNDING = 1e-14  # of the terms of a margin: a margin that is negative by less is zero
 _FULL = 1.0 - 1e-9  # part of the pad that touches, from which on it touches everywhere
-_KINK = 1e-7  # of a step, to which it is known when the pad begins or ends to touch, somewhere or everywhere
+_KINK = 1e-12  # of a step, to which it is known when the pad begins or ends to touch, somewhere or everywhere
 _SEEKS = 60  # steps of the search for an event
 _ABOVE = 0.75  # of a part at which a margin is negative, the middle of a bracket from its half on
 # of the rounding of a margin, and of a step: ends of that search
