@@ -62,7 +62,7 @@ def test_a_longer_run_has_an_exponent_within_the_errors(seed: int) -> None:
 def test_exponents_of_runs_mirror_images_and_longer_runs_agree_within_three_errors() -> None:
     """An error comes of eight batches, so that more pairs than of a normal distribution are beyond three of them.
 
-    Of random walks 1.1 % of pairs are. One in a hundred draws of 90 triples has more than 9 (simulated with `exponents`).
+    Of random walks 1.1 % of pairs are: one in a hundred draws of 90 triples has more than 9, by a simulation.
     How a chaotic shoe wanders hangs on the last digit of its start, which another processor rounds otherwise.
     """
     wrong = {seed: count for seed in range(90) if (count := disagree(rough_shoe(seed)))}
