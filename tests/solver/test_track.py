@@ -177,6 +177,29 @@ def test_a_rough_shoe_leaves_the_wheel_in_event_driven_steps_where_short_steps_s
     assert np.abs(of_kind(long, MAX, MIN)[0] - of_kind(short, MAX, MIN)[0]).max() < 1e-6
 
 
+@pytest.mark.parametrize(("number", "unloaded"), [(2, True), (12, False)])
+def test_a_rough_pad_has_events_of_contact_where_it_touches_and_not_where_it_may(
+    number: int, unloaded: bool
+) -> None:
+    """Between flight, in which it is clear for sure, and contact lies a height at which it need not touch.
+
+    Samples are close enough to show every change of contact.
+    """
+    tables: Tables = next(islice(random_shoes("open", 991), number, None))
+    interval = tables["output"]["sample_interval"]
+    force = tables["load"]["force"]
+    if unloaded:
+        times = [0.0, 50.0 * interval, 60.0 * interval]
+        tables = {**tables, "load": {"times": times, "forces": [force, force, 0.3 * force]}}
+    solver = {"duration": 200.0 * interval, "scheme": "event-driven", "tolerance": 1e-6}
+    case = make({**tables, "solver": solver, "output": {"sample_interval": interval / 100.0}})
+    motion = solve(replace(system_of(case), tracked=True))
+    assert motion.track is not None
+    changes = np.diff((motion.rows[:, 6] > 0.0).astype(int))
+    assert (changes < 0).sum() > 0
+    assert motion.track.counts[[LIFT, TOUCH]].tolist() == [(changes < 0).sum(), (changes > 0).sum()]
+
+
 def open_parts(track: Track, parts: int) -> float:
     """The largest closing error of a part, over the largest item of its account."""
     errors = list[float]()
