@@ -1,29 +1,15 @@
-"""What a motion comes to in the end: steady sliding, or a vibration, from which a branch may begin."""
+"""The cycle that a motion comes to in the end, from which a branch may begin."""
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.stability.modes import eigensystem
+from brakecli.analysis.fate import fate_on_smooth_pads
 from brakecli.branches.cycles import Cycles
-from brakecli.branches.line import Shoe
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array
 from brakecli.solver.motion.events import DONE
-from brakecli.solver.motion.flow import Orbit, Pursuit
-from brakecli.solver.motion.orbit import FOUND, LINEAR
-from brakecli.stop import signalled
-
-MOST_STEPS = 5_000_000
-"""Steps of a motion on smooth pads after which it is given up: about half a second."""
-
-NEARS = 1.0
-"""Powers of e by which a disturbance of unstable sliding may grow without an event, of a motion that nears it."""
-
-AHEAD = 10_000
-"""Steps without an event, at least, of such a motion."""
 
 SETTLE = 400
 SEEN = 8
@@ -45,52 +31,6 @@ AT_REST = 1e-3
 """Size of a motion, over the compression of the pad, below which it has died out."""
 
 
-class End(NamedTuple):
-    """What a motion comes to: whether vibration `lasts`, None where that is not known.
-
-    `state`: x, y, v_x and v_y on the vibration, at t = 0 of the waves; `orbit` where it is a limit cycle, and the
-    `rate` (1/s) at which its slowest disturbance fades.
-    """
-
-    lasts: bool | None
-    state: Array | None = None
-    orbit: Orbit | None = None
-    rate: float | None = None
-
-
-FADES = End(False)
-UNKNOWN = End(None)
-
-
-def on_smooth_pads(shoe: Shoe, state: Array, longest: float = math.inf) -> End:
-    """What the motion from a state (x, y, v_x, v_y) comes to at constant speed and load, in a `longest` time (s).
-
-    It fades once its modes can bring about no event any more, and lasts once it nears an orbit that attracts it.
-    Where sliding is unstable it cannot fade; one that is still vibrating when it is given up has a `state`.
-    """
-    c, stiffness, belt, load = shoe
-    if shoe.rest is None or not shoe.rest[1] < 0.0:  # it locks, or would hang off the wheel
-        return UNKNOWN
-    values, shapes = eigensystem(c, stiffness, c.grip(belt))
-    modes = values, np.concatenate([shapes, shapes * values])
-    try:
-        motion = Pursuit(c, (stiffness, belt, load), state, np.array(shoe.rest), modes)
-    except np.linalg.LinAlgError:  # modes that are alike
-        return UNKNOWN
-    rate = float(values.real.max())
-    while motion.steps < MOST_STEPS and motion.time < longest and not signalled():
-        if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
-            motion.way.duration = motion.time + max(NEARS / rate, AHEAD * motion.path.h)
-        outcome = motion.seek()
-        if outcome == LINEAR:
-            return UNKNOWN if rate > 0.0 else FADES
-        if outcome == FOUND and motion.multiplier < 1.0:
-            rate = -math.log(max(motion.multiplier, 1e-300)) / motion.orbit.period
-            return End(True, np.array(motion.orbit.state), motion.orbit, rate)
-        motion.way.events = 0  # many between two falls are too many for a cycle, not for a motion
-    return End(None) if rate <= 0.0 else End(None, motion.state)
-
-
 def settled(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:
     """The cycle that the motion from a state (x, y, v_x, v_y) comes to at p.
 
@@ -99,7 +39,7 @@ def settled(problem: Cycles, p: float, state: Array, frequency: float) -> Point 
     """
     if not problem.line.smooth:
         return _returning(problem, p, state, frequency)
-    end = on_smooth_pads(problem.line.shoe(p), state)
+    end = fate_on_smooth_pads(problem.line.shoe(p), state)
     flow = problem.flow(p)
     if end.orbit is None:
         return None

@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.branches.begin import on_smooth_pads
-from brakecli.branches.line import Shoe
+from brakecli.analysis.fate import fate_on_smooth_pads
+from brakecli.analysis.shoe import Shoe
 from brakecli.branches.problem import Array
 from brakecli.branches.sliding import Change, Slide, stable_spans
 from brakecli.branches.told import Followed
@@ -118,7 +118,7 @@ def tried(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> Tried
         if stop():
             break
         done += 1
-        end = on_smooth_pads(shoe, rest + scales * push, longest)
+        end = fate_on_smooth_pads(shoe, rest + scales * push, longest)
         undecided += end.lasts is None
         if end.orbit is not None and not any(_alike(end.orbit, orbit) for orbit in orbits):
             orbits.append(end.orbit)

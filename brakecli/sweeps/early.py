@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.answers import Answers, Fate
+from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.decision import Regime, Thresholds
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, tenths
 from brakecli.analysis.regime.table import decide
@@ -194,7 +194,7 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
     answers = Answers(
         duration=end,
         growth=theory.mode.growth,
-        without_waves=Fate.LASTS,
+        without_waves=Continuation.LASTS,
         level=1.0,  # the same as on the orbit
         level_without_waves=1.0,
         amplitude_without_waves=orbit.amplitude,

@@ -4,17 +4,13 @@ import math
 from functools import cache
 from typing import NamedTuple
 
-import numpy as np
-
+from brakecli.analysis.fate import Fate, Kind, fate
 from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
-from brakecli.branches.begin import FADES, UNKNOWN, End, on_smooth_pads
-from brakecli.branches.line import Shoe
 from brakecli.branches.problem import Array
-from brakecli.branches.rough_end import on_rough_pads
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.runs.limits import within_range
@@ -32,7 +28,9 @@ DURATIONS: tuple[float, ...] = 1.0, 2.0, 4.0, 8.0
 SAME = 0.01
 """Relative change of the amplitude in a run twice as long that shows that a vibration lasts."""
 
-LASTS = End(True)
+LASTS = Fate(Kind.VIBRATION)
+FADES = Fate(Kind.STEADY_SLIDING)
+UNKNOWN = Fate(Kind.UNKNOWN)
 
 
 class Lasting(NamedTuple):
@@ -59,7 +57,7 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
     high = line.high
 
     @cache
-    def end(value: float) -> End:
+    def end(value: float) -> Fate:
         return LASTS if found.unstable_at(value) else _end(answers, value)
 
     def ended(value: float | None, outcome: Outcome) -> Lasting:
@@ -95,7 +93,7 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
     return ended(0.5 * (fading + lasting), Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
 
 
-def _end(answers: Answers, value: float) -> End:
+def _end(answers: Answers, value: float) -> Fate:
     """What the case's own start comes to: by the flow of the equations, whatever scheme the case has.
 
     Runs of the case decide where no motion repeats, no dashpot damps, no link holds the shoe or the wheel rests,
@@ -109,16 +107,13 @@ def _end(answers: Answers, value: float) -> End:
     repeats = system.steady and (not waves or common_period(system) is not None)
     if is_undamped(system.coefficients) or not (slides and repeats):
         return _by_runs(case, system)
-    if system.smooth:
-        shoe = Shoe.of(system)
-        return UNKNOWN if shoe.rest is None else on_smooth_pads(shoe, system.initial.beside(shoe.rest))
     if (rest := sliding(system)) is None:
         return UNKNOWN
-    known = calm(answers, value) if waves else [np.array([rest.x, rest.y, 0.0, 0.0])]
-    return on_rough_pads(system, system.initial.beside((rest.x, rest.y)), known)
+    forced = calm(answers, value) if waves else None
+    return fate(system, system.initial.beside((rest.x, rest.y)), forced=forced)
 
 
-def _by_runs(case: Case, system: System) -> End:
+def _by_runs(case: Case, system: System) -> Fate:
     """Whether vibration lasts by the verdicts on runs, each twice as long as the one before.
 
     It is asked where sliding is not known to be unstable. So in full contact what neither sticks nor lifts off

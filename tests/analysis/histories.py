@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.answers import Fate
+from brakecli.analysis.regime.answers import Continuation
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Thresholds
@@ -97,5 +97,5 @@ def classified(history: History, context: Context, thresholds: Thresholds | None
 def lasting(history: History, context: Context, thresholds: Thresholds | None = None, **asked: Any) -> Verdict:
     """The verdict on a history that is known to last, as its end is, where it is continued on the smooth wheel."""
     x, v_x = (history.read(name, 3 * history.samples // 4, history.samples) for name in ("x", "vx"))
-    lasts = Continued(Fate.LASTS, 0.5 * float(np.ptp(x)), float(v_x.std()), math.inf)
+    lasts = Continued(Continuation.LASTS, 0.5 * float(np.ptp(x)), float(v_x.std()), math.inf)
     return classified(history, context, thresholds, continued=lambda: lasts, **asked)

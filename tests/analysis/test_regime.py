@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.answers import Fate
+from brakecli.analysis.regime.answers import Continuation
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.measure import Continued
@@ -143,11 +143,13 @@ def test_a_motion_that_still_grows_or_decays_is_undecided_and_says_how_fast(rate
 def test_a_decay_to_nothing_is_damped() -> None:
     history = made(np.exp(-5.0 * TIME) * np.sin(2 * np.pi * 170.0 * TIME))
     assert classified(history, Context(1.0)).regime is Regime.UNDECIDED
-    assert classified(history, Context(1.0), continued=lambda: Continued(Fate.DIES)).regime is Regime.DAMPED
+    assert (
+        classified(history, Context(1.0), continued=lambda: Continued(Continuation.DIES)).regime is Regime.DAMPED
+    )
 
 
 def test_what_dies_has_no_settled_amplitude_however_slowly_it_does() -> None:
-    known = Continued(Fate.DIES)
+    known = Continued(Continuation.DIES)
     verdict = classified(made(np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0), continued=lambda: known)
     assert (verdict.regime, verdict.settled) == (Regime.DAMPED, False)
 

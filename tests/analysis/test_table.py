@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.answers import Answers, Fate
+from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.looks import LOOKS
 from brakecli.analysis.regime.table import CONTACT, ROUGH, SMOOTH, decide
@@ -19,7 +19,11 @@ MOVING = Answers(
     level=1.0, seconds=5.0, settled=True, cycles=100.0, frequency=100.0, samples_per_cycle=20.0, stick_cycles=0.0,
     harmonic_share=1.0,
 )  # fmt: skip
-LASTS: dict[str, Any] = {"without_waves": Fate.LASTS, "amplitude_without_waves": 1.0, "level_without_waves": 1.0}
+LASTS: dict[str, Any] = {
+    "without_waves": Continuation.LASTS,
+    "amplitude_without_waves": 1.0,
+    "level_without_waves": 1.0,
+}
 SHAKEN: dict[str, Any] = {
     "waves": True, "slowest": 1.0, "exponent": 0.0, "exponent_error": 0.01, "even": 0.0, "even_error": 0.01,
     "power_of_friction": 1.0, "friction_error": 0.1, "power_of_roughness": 0.1, "roughness_error": 0.1,
@@ -49,10 +53,10 @@ SMOOTH_ROWS: dict[str, dict[str, Any]] = {
     "no friction": {"frictionless": True},
     "no friction, no dashpots": {"frictionless": True, "undamped": True},
     "no dashpots": {"undamped": True, "growth": 0.0},
-    "fades": {"without_waves": Fate.DIES},
+    "fades": {"without_waves": Continuation.DIES},
     "lasts: quasi-harmonic": LASTS,
     "on its way: quasi-harmonic": {**LASTS, "level_without_waves": 2.0},
-    "lasts, irregular: quasi-harmonic": {"without_waves": Fate.LASTS},
+    "lasts, irregular: quasi-harmonic": {"without_waves": Continuation.LASTS},
     "comes and goes": {"change": math.nan, "change_error": math.nan},
     "undecided": {"change": 0.5},
 }
@@ -66,12 +70,12 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "forced, no friction": {"frictionless": True},
     "no friction, no dashpots": {"frictionless": True, "undamped": True},
     "bounces": {"touches": False},
-    "forced, neighbours": {**FADING, "without_waves": Fate.DIES, "change": 0.5},
-    "forced, level": {"without_waves": Fate.DIES, "change": -0.5, "power_of_friction": 0.1},
+    "forced, neighbours": {**FADING, "without_waves": Continuation.DIES, "change": 0.5},
+    "forced, level": {"without_waves": Continuation.DIES, "change": -0.5, "power_of_friction": 0.1},
     "forced, friction takes": {"power_of_friction": -1.0, "power_of_roughness": 2.0},
     "forced, roughness gives": {**FADING, "power_of_roughness": 3.0},
     "forced, another level": {**FADING, **LASTS, "level_without_waves": 2.0},
-    "dies out, not yet": {"without_waves": Fate.DIES, "change": 0.5},
+    "dies out, not yet": {"without_waves": Continuation.DIES, "change": 0.5},
     "no dashpots, rough": {"undamped": True},
     "self-excited: quasi-harmonic": LASTS,
     "locked to the waves: quasi-harmonic": {**FADING, **LASTS},
@@ -157,8 +161,18 @@ def test_no_sentence_has_a_number_that_is_not_known() -> None:
 @pytest.mark.parametrize(
     ("name", "value", "changes", "rows"),
     [
-        ("settled_within", 0.3, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
-        ("sure_errors", 60.0, {"change": 0.5, "without_waves": Fate.LASTS}, ("undecided", "lasts, irregular")),
+        (
+            "settled_within",
+            0.3,
+            {"change": 0.5, "without_waves": Continuation.LASTS},
+            ("undecided", "lasts, irregular"),
+        ),
+        (
+            "sure_errors",
+            60.0,
+            {"change": 0.5, "without_waves": Continuation.LASTS},
+            ("undecided", "lasts, irregular"),
+        ),
         ("same_level", 0.6, {**LASTS, "level_without_waves": 2.0}, ("on its way", "lasts")),
         ("comes_together", 6.0, {**FADING, **LASTS}, ("locked to the waves", "kept up by friction")),
         ("most", 20.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
@@ -198,7 +212,7 @@ def test_what_still_grows_on_a_rough_wheel_looks_as_the_limit_cycle_to_which_it_
     [
         {**LASTS, "exponent": -0.08, "power_of_roughness": 1.0},  # together, but by less than a power of e
         {**LASTS, "level_without_waves": 2.0},  # sliding is stable, and may be what the waves shake
-        {"without_waves": Fate.DIES},  # and yet friction keeps it up, with a phase of its own
+        {"without_waves": Continuation.DIES},  # and yet friction keeps it up, with a phase of its own
     ],
 )
 def test_what_shows_neither_a_phase_of_its_own_nor_that_waves_lead_is_undecided(changes: dict[str, Any]) -> None:

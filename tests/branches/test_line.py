@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from brakecli.branches.line import Line, Shoe
+from brakecli.analysis.shoe import Shoe
+from brakecli.branches.line import Line
 from brakecli.errors import CaseError
 from brakecli.solver.steady_sliding import steady_sliding
 from tests.examples import SQUEAL, make

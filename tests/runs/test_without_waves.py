@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.answers import Fate
+from brakecli.analysis.fate import fate_on_smooth_pads
+from brakecli.analysis.regime.answers import Continuation
 from brakecli.analysis.regime.measure import Continued
-from brakecli.branches.begin import on_smooth_pads
-from brakecli.branches.line import Shoe
+from brakecli.analysis.shoe import Shoe
 from brakecli.case.system import system_of
 from brakecli.runs.without_waves import LONGEST, without_waves
 from brakecli.solver.integrate import solve
@@ -37,7 +37,7 @@ def continued(shoe: System) -> Continued:
 def test_a_vibration_comes_to_the_limit_cycle_of_a_long_run(roughness: dict[str, Any], omega: float) -> None:
     """By stick, and by loss of contact; the waves of the wheel do not matter."""
     found = continued(system(**roughness, wheel__angular_speed=omega))
-    assert found.fate is Fate.LASTS
+    assert found.fate is Continuation.LASTS
     interval = found.period / 100.0
     changes: dict[str, Any] = {"solver__step": 0.02 * interval, "output__sample_interval": interval}
     rows = solve(system(wheel__angular_speed=omega, **changes, solver__duration=1.0)).rows[-2000:]
@@ -50,7 +50,7 @@ def test_a_vibration_comes_to_the_limit_cycle_of_a_long_run(roughness: dict[str,
 def test_below_the_critical_friction_it_dies_out_from_any_start() -> None:
     shoe = replace(system(), coefficients=system().coefficients._replace(phi=0.3))
     for speed in (1e-5, 0.05, 1.0):
-        assert without_waves(shoe, np.array([0.0, 0.0, speed, 0.0])) == Continued(Fate.DIES)
+        assert without_waves(shoe, np.array([0.0, 0.0, speed, 0.0])) == Continued(Continuation.DIES)
 
 
 def test_what_comes_near_unstable_sliding_is_not_said_to_last() -> None:
@@ -58,7 +58,7 @@ def test_what_comes_near_unstable_sliding_is_not_said_to_last() -> None:
     shoe = system()
     rest = steady_sliding(shoe)
     found = without_waves(shoe, np.array([rest.x, rest.y, 1e-300, 0.0]))
-    assert found.fate is Fate.UNKNOWN
+    assert found.fate is Continuation.UNKNOWN
     assert math.isnan(found.amplitude)
 
 
@@ -66,15 +66,15 @@ def test_on_a_standing_wheel_nothing_is_asked() -> None:
     assert continued(system(wheel__angular_speed=0.0)) == Continued()
 
 
-@pytest.mark.parametrize(("friction", "fate"), [(0.3, Fate.DIES), (0.7, Fate.LASTS)])
-def test_a_rough_shoe_is_continued_by_the_curve_of_its_force(friction: float, fate: Fate) -> None:
+@pytest.mark.parametrize(("friction", "fate"), [(0.3, Continuation.DIES), (0.7, Continuation.LASTS)])
+def test_a_rough_shoe_is_continued_by_the_curve_of_its_force(friction: float, fate: Continuation) -> None:
     shoe = system_of(make(SQUEAL | {"roughness": {**WAVES, **BUMPS}}, friction__coefficient=friction))
     assert continued(shoe).fate is fate
     flat = system_of(make(SQUEAL | {"roughness": BUMPS}, friction__coefficient=friction, solver__duration=2.0))
     speeds = solve(flat).rows[:, 2]
     late = speeds[-1000:].std()
     early = speeds[: len(speeds) // 8].std()
-    assert bool(late > 0.5 * early) == (fate is Fate.LASTS)
+    assert bool(late > 0.5 * early) == (fate is Continuation.LASTS)
 
 
 def test_without_dashpots_no_limit_cycle_is_sure_to_stay() -> None:
@@ -95,7 +95,7 @@ def test_without_dashpots_no_limit_cycle_is_sure_to_stay() -> None:
     }  # fmt: skip
     shoe = system_of(make(tables))
     state = solve(shoe).rows[-1, :4]
-    assert on_smooth_pads(Shoe.of(shoe), state, LONGEST * shoe.sampled_duration).orbit is not None
+    assert fate_on_smooth_pads(Shoe.of(shoe), state, LONGEST * shoe.sampled_duration).orbit is not None
     found = without_waves(shoe, state)
-    assert found.fate is Fate.LASTS
+    assert found.fate is Continuation.LASTS
     assert math.isnan(found.amplitude)

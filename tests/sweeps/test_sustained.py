@@ -7,12 +7,13 @@ from unittest.mock import Mock
 import numpy as np
 import pytest
 
+from brakecli.analysis.fate import fate_on_smooth_pads
 from brakecli.analysis.regime.decision import Decision, Regime
 from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.shoe import Shoe
 from brakecli.branches.answers import Answers
-from brakecli.branches.begin import on_smooth_pads, settled
+from brakecli.branches.begin import settled
 from brakecli.branches.cycles import Cycles
-from brakecli.branches.line import Shoe
 from brakecli.case.system import system_of
 from brakecli.solver.motion.flow import SmoothFlow
 from brakecli.sweeps.read_off import explored
@@ -201,7 +202,7 @@ def test_what_bounces_ever_higher_beside_stable_sliding_lasts() -> None:
     flow = SmoothFlow.of(system_of(case))
     shoe = Shoe.of(system_of(case))
     assert shoe.rest is not None
-    end = on_smooth_pads(shoe, system_of(case).initial.beside(shoe.rest))
+    end = fate_on_smooth_pads(shoe, system_of(case).initial.beside(shoe.rest))
     assert end.state is not None
     assert end.orbit is not None
     flow(end.state, end.orbit.period)

@@ -21,7 +21,7 @@ def shown_after(duration: float, rate: float) -> float:
     return QUARTER * (duration + FADED / max(rate, 1e-300))
 
 
-class Fate(StrEnum):
+class Continuation(StrEnum):
     """What becomes of a motion on the smooth wheel."""
 
     DIES = "dies"
@@ -63,7 +63,7 @@ class Answers(NamedTuple):
     exponent_error: float = math.nan
     even: float = math.nan  # the same of a linear motion, by a line
     even_error: float = math.nan
-    without_waves: Fate = Fate.UNKNOWN  # of the motion on the smooth wheel
+    without_waves: Continuation = Continuation.UNKNOWN  # of the motion on the smooth wheel
     amplitude: float = math.nan  # of x at the end
     level: float = math.nan  # standard deviation of vx there
     amplitude_without_waves: float = math.nan  # that it comes to on the smooth wheel
@@ -146,7 +146,7 @@ class Answers(NamedTuple):
     @property
     def becomes(self) -> str:
         """What becomes of the vibration on the smooth wheel."""
-        known = self.without_waves is not Fate.UNKNOWN
+        known = self.without_waves is not Continuation.UNKNOWN
         return f"it {self.without_waves}" if known else "it is not known what it comes to"
 
     @property

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.answers import Answers, Fate
+from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
@@ -27,7 +27,7 @@ _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
 class Continued(NamedTuple):
     """What the motion comes to on the smooth wheel, in SI units; nan where it is no limit cycle."""
 
-    fate: Fate = Fate.UNKNOWN
+    fate: Continuation = Continuation.UNKNOWN
     amplitude: float = math.nan
     level: float = math.nan  # standard deviation of vx
     rate: float = math.nan  # at which its slowest disturbance fades

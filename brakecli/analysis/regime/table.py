@@ -6,7 +6,7 @@ says that the motion lasts by itself leaves it to the rows of `LOOKS` how it loo
 
 import math
 
-from brakecli.analysis.regime.answers import Answers, Fate
+from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.conditions import (
     another,
     apart,
@@ -163,28 +163,28 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "fades",
-        lambda a, t: a.without_waves == Fate.DIES,
+        lambda a, t: a.without_waves == Continuation.DIES,
         "the vibration dies out: continued, it comes to steady sliding",
         "",
         _DAMPED,
     ),
     Row(
         "lasts",
-        lambda a, t: a.without_waves == Fate.LASTS and same(a, t),
+        lambda a, t: a.without_waves == Continuation.LASTS and same(a, t),
         "the vibration lasts[: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m]",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "on its way",
-        lambda a, t: a.without_waves == Fate.LASTS and math.isfinite(a.amplitude_without_waves),
+        lambda a, t: a.without_waves == Continuation.LASTS and math.isfinite(a.amplitude_without_waves),
         "the vibration lasts, and is still on its way to an amplitude of {a.amplitude_without_waves:.3g} m",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "lasts, irregular",
-        lambda a, t: a.without_waves == Fate.LASTS and steady(a, t),
+        lambda a, t: a.without_waves == Continuation.LASTS and steady(a, t),
         "the vibration lasts, as sliding is unstable, and its level does not change",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
@@ -238,7 +238,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "forced, neighbours",
-        lambda a, t: a.without_waves == Fate.DIES and together(a, t),
+        lambda a, t: a.without_waves == Continuation.DIES and together(a, t),
         "only the roughness shakes the shoe: without it the vibration dies out, and small disturbances "
         "have a growth rate of {a.exponent:.3g} 1/s",
         regime=Regime.DAMPED,
@@ -247,7 +247,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "forced, level",
         lambda a, t: (
-            a.without_waves == Fate.DIES
+            a.without_waves == Continuation.DIES
             and (steady(a, t) or a.change < 0.0)
             and friction_gives_less(a, t)
             and not a.undamped
@@ -261,7 +261,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         lambda a, t: (
             takes(a, t)
             and roughness_gives_most(a, t)
-            and (steady(a, t) or a.without_waves == Fate.DIES)
+            and (steady(a, t) or a.without_waves == Continuation.DIES)
             and not a.undamped
         ),
         "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, and friction takes "
@@ -288,7 +288,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "dies out, not yet",
-        lambda a, t: a.without_waves == Fate.DIES and not steady(a, t),
+        lambda a, t: a.without_waves == Continuation.DIES and not steady(a, t),
         "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
         "second half",
         "run at least {a.waited:.3g} s",
@@ -303,7 +303,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "self-excited",
         lambda a, t: (
-            a.without_waves == Fate.LASTS
+            a.without_waves == Continuation.LASTS
             and apart(a, t)
             and (a.growth > 0.0 or (steady(a, t) and not another(a, t)))
             and gives(a, t)
@@ -316,7 +316,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "locked to the waves",
         lambda a, t: (
-            a.without_waves == Fate.LASTS
+            a.without_waves == Continuation.LASTS
             and together(a, t)
             and steady(a, t)
             and same(a, t)
@@ -329,7 +329,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "kept up by friction",
         lambda a, t: (
-            a.without_waves == Fate.LASTS
+            a.without_waves == Continuation.LASTS
             and steady(a, t)
             and (same(a, t) or (roughness_is_idle(a, t) and not another(a, t)))
             and friction_gives_most(a, t)

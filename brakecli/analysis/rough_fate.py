@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from brakecli.analysis.stability.modes import slowest_of_cycles
-from brakecli.branches.begin import FADES, UNKNOWN, End
-from brakecli.branches.problem import Array
+from brakecli.solver.arrays import Floats
 from brakecli.solver.motion.rough import RoughFlow, Status, default_steps
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
@@ -61,7 +60,7 @@ class _Span:
         depth = abs(system.load_at_start) / (c.c_yy + system.contact_stiffness)
         self.rounding = AT_CALM * depth / self.scales[1]
 
-    def __call__(self, state: Array, tangents: bool) -> tuple[Array, Array] | None:
+    def __call__(self, state: Floats, tangents: bool) -> tuple[Floats, Floats] | None:
         """The states at the ends of all parts, and the derivative of the last one; None where there is no flow."""
         states = [state]
         matrix = np.eye(4)
@@ -79,14 +78,14 @@ class _Span:
 class _Calm:
     """A stable motion that is no vibration, over a span, and what becomes of disturbances of it."""
 
-    def __init__(self, span: _Span, states: Array, matrix: Array) -> None:
+    def __init__(self, span: _Span, states: Floats, matrix: Floats) -> None:
         self.span = span
         self.states = states
         self.factors, vectors = np.linalg.eig(matrix * span.scales / span.scales[:, None])
         self.radius = float(np.abs(self.factors).max())
         self.to_modes = np.linalg.inv(vectors) / span.scales
 
-    def attracts(self, states: Array) -> bool:
+    def attracts(self, states: Floats) -> bool:
         """Whether a motion obeys, over the span, the linear equations of disturbances, which die out.
 
         The sizes of modes are theirs but for less than what they lose, however little that is. A mode of a larger
@@ -101,49 +100,52 @@ class _Calm:
         rounding = self.span.rounding
         return self.radius < 1.0 and off <= FOLLOWS * loss + rounding and turned <= TURNS * size + rounding
 
-    def distance(self, states: Array) -> float:
+    def distance(self, states: Floats) -> float:
         """The largest distance of a motion within the span, as the root of twice the energy that it takes."""
         apart = states - self.states
         return math.sqrt(float(np.einsum("ni,ij,nj->n", apart, self.span.weights, apart).max()))
 
 
-def on_rough_pads(system: System, state: Array, calm: Sequence[Array], longest: float = math.inf) -> End:
-    """What the motion from a state at t = 0 comes to, at constant speed and load, in a `longest` time (s).
+def lasts_on_rough_pads(
+    system: System, state: Floats, calm: Sequence[Floats], within: float = math.inf
+) -> tuple[bool | None, Floats, int]:
+    """Whether the motion from a state at t = 0 lasts, at constant speed and load; its last state, and its steps.
 
     `calm`: states at t = 0 of the stable motions that are no vibrations: of steady sliding on a smooth wheel, else
     of what the waves force. The motion fades once it follows the linear equations of one of them. It lasts once
-    it has kept its distance from all of them in a time twice as long. Unknown without any of them.
+    it has kept its distance from all of them in a time twice as long. None without any of them, and where neither
+    is seen within some time (s).
     """
     span = _Span(system)
     known = list[_Calm]()
     for each in calm:
         flown = span(np.array(each, float), True)
         if flown is None:
-            return UNKNOWN
+            return None, state, span.taken
         try:
             known.append(_Calm(span, *flown))
         except np.linalg.LinAlgError:  # disturbances that are alike
-            return UNKNOWN
+            return None, state, span.taken
     last = np.array(state, float)
     far = list[float]()
     drawn = 0
     spans = [SETTLING / (slowest_of_cycles(system.coefficients) * span.length)]
     spans += [NOTICED / -math.log(each.radius) for each in known if 0.0 < each.radius < 1.0]
-    while known and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < longest:
+    while known and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < within:
         flown = span(last, False)
         if flown is None:
             break
         drawn = drawn + 1 if any(each.attracts(flown[0]) for each in known) else 0
         if drawn == IN_A_ROW:
-            return FADES
+            return False, flown[0][-1], span.taken
         last = flown[0][-1]
         far.append(min(each.distance(flown[0]) for each in known))
         quarter, rest = divmod(len(far), 4)
         whole = rest == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
         kept = whole and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter])
         if kept and quarter >= max(spans) and not _falls(far[quarter:]):
-            return End(True, last)
-    return UNKNOWN
+            return True, last, span.taken
+    return None, last, span.taken
 
 
 def _falls(far: list[float]) -> bool:
