@@ -9,7 +9,7 @@ import pytest
 
 from brakecli.analysis import fate as room
 from brakecli.analysis import rough_fate
-from brakecli.analysis.fate import Fate, fate, fate_on_smooth_pads
+from brakecli.analysis.fate import Fate, Kind, fate, fate_on_smooth_pads
 from brakecli.analysis.shoe import Shoe
 from brakecli.branches.forced import Forced
 from brakecli.branches.line import Line
@@ -23,8 +23,8 @@ from tests.campaign import campaign
 from tests.examples import SQUEAL, make
 from tests.sweeps.shoes import drawn as rough_drawn
 
-BUMPS = {"shoe": {"amplitudes": [2e-6], "wavelengths": [0.05]}}
-WAVES = {"wheel": {"amplitudes": [2e-5], "wavelengths": [0.03]}}
+BUMPS = {"amplitudes": [2e-6], "wavelengths": [0.05]}
+WAVES = {"amplitudes": [2e-5], "wavelengths": [0.03]}
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -88,10 +88,10 @@ def test_a_shoe_that_locks_or_hangs_off_the_wheel_is_named() -> None:
         ({}, Kind.LIMIT_CYCLE),
         ({"friction__coefficient": 0.3}, Kind.STEADY_SLIDING),
         ({"wheel__angular_speed": 0.0}, Kind.UNKNOWN),
-        ({"roughness": BUMPS}, Kind.VIBRATION),
-        ({"roughness": BUMPS, "friction__coefficient": 0.3}, Kind.STEADY_SLIDING),
-        ({"roughness": BUMPS, "link1__damping": 0.0, "link2__damping": 0.0}, Kind.UNKNOWN),
-        ({"roughness": WAVES, "friction__coefficient": 0.3}, Kind.UNKNOWN),  # what the waves force is not given
+        ({"roughness__shoe": BUMPS}, Kind.VIBRATION),
+        ({"roughness__shoe": BUMPS, "friction__coefficient": 0.3}, Kind.STEADY_SLIDING),
+        ({"roughness__shoe": BUMPS, "link1__damping": 0.0, "link2__damping": 0.0}, Kind.UNKNOWN),
+        ({"roughness__wheel": WAVES, "friction__coefficient": 0.3}, Kind.UNKNOWN),  # what the waves force is not given
     ],
 )
 def test_a_system_comes_to_what_its_surfaces_allow(changes: dict[str, Any], kind: Kind) -> None:
