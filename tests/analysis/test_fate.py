@@ -91,7 +91,7 @@ def test_a_shoe_that_locks_or_hangs_off_the_wheel_is_named() -> None:
         ({"roughness__shoe": BUMPS}, Kind.VIBRATION),
         ({"roughness__shoe": BUMPS, "friction__coefficient": 0.3}, Kind.STEADY_SLIDING),
         ({"roughness__shoe": BUMPS, "link1__damping": 0.0, "link2__damping": 0.0}, Kind.UNKNOWN),
-        ({"roughness__wheel": WAVES, "friction__coefficient": 0.3}, Kind.UNKNOWN),  # what the waves force is not given
+        ({"roughness__wheel": WAVES, "friction__coefficient": 0.3}, Kind.UNKNOWN),  # nothing says what they force
     ],
 )
 def test_a_system_comes_to_what_its_surfaces_allow(changes: dict[str, Any], kind: Kind) -> None:

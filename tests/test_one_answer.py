@@ -1,0 +1,39 @@
+"""The same question has the same answer, whoever is asked: the critical friction of smooth shoes."""
+
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pytest
+import tomli_w
+
+import brakecli
+from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
+from brakecli.scattering.eigen import _asked as of_a_sample
+from tests.analysis.shoes import random_shoes
+from tests.campaign import counts
+
+DIGITS = 5e-7
+"""Part of a critical value that seven digits do not show: more than any command prints."""
+
+
+@pytest.mark.parametrize("number", counts(4, 40))
+def test_all_commands_have_the_same_critical_friction(number: int, tmp_path: Path) -> None:
+    """`stability`, `advise`, `branch`, a sweep without axes, and a sample of `scatter` that is the case itself."""
+    for place, tables in enumerate(islice(random_shoes("smooth", 50), number)):
+        file = tmp_path / f"{place}.toml"
+        file.write_text(tomli_w.dumps(tables))
+        value = float(brakecli.stability(file, pushes=0).critical_friction)
+        if not np.isfinite(value):  # the wheel stands
+            continue
+        ends = (0.0, 2.0 * value)
+        searched = {"parameter": "friction.coefficient", "lower": ends[0], "upper": ends[1]}
+        answers = {
+            "advise": brakecli.advise(file).critical_friction,
+            "branch": brakecli.branch(file, parameter={"friction.coefficient": ends}, pushes=0).attrs["critical"],
+            "sweep": np.ravel(brakecli.sweep(file, critical=searched, jobs=1).critical)[0],
+            "scatter": of_a_sample(system_of(parse_case(file.read_text(), file.name).case), None)[2],
+        }
+        for name, answer in answers.items():
+            assert answer == pytest.approx(value, rel=DIGITS), (place, name)
