@@ -21,3 +21,12 @@ class Coefficients(NamedTuple):
     def grip(self, belt: float) -> float:
         """φ sign(U), the friction force of steady sliding over the normal force; 0 where the wheel stands."""
         return math.copysign(self.phi, belt) if belt else 0.0
+
+
+def fastest_decay(c: Coefficients) -> float:
+    """A bound (1/s) on how fast anything decays: the largest eigenvalue of the dashpots over the mass.
+
+    With v' B v/m = β for the velocity v of a mode, λ² + β λ + κ = 0: real parts are -β at least, as κ >= 0.
+    """
+    mean = 0.5 * (c.b_xx + c.b_yy)
+    return (mean + math.hypot(0.5 * (c.b_xx - c.b_yy), c.b_xy)) / c.m

@@ -353,3 +353,43 @@ def test_a_phase_within_a_step_whose_margin_rises_at_both_ends_is_found(what: st
     scale = np.abs(other.rows[:, :4]).max(axis=0)
     # y is 1e6 times smaller than x, by whose rounding it is off; without the phase it is off by 1e-5 and more
     assert float((np.abs(found.rows[:, :4] - other.rows[:, :4]).max(axis=0) / scale).max()) < 1e-8
+
+
+@pytest.mark.parametrize("lack", [0.0, *10.0 ** -np.arange(5.0, 17.0)])
+@pytest.mark.parametrize("speed", [1.0, 0.1])
+def test_a_shoe_that_all_but_sticks_is_carried_along(lack: float, speed: float) -> None:
+    """ẍ + x = λ, |λ| ≤ 1, with the wheel's velocity U from x = -1 - ε on, where friction lacks ε.
+
+    It runs ahead of the wheel by ε²/2U m/s at most and 2ε³/3U² m, for a time 2ε/U, and then sticks until x = 1.
+    """
+    start = {"initial__at": "rest", "initial__x": -1.0 - lack, "initial__y": -1.0, "initial__vx": speed}
+    changes = {
+        "wheel__angular_speed": speed,
+        "solver__duration": 1.9 / speed,
+        "output__sample_interval": 0.1 / speed,
+    }
+    case = make(COULOMB, **start, **changes, solver__scheme="piecewise-exact", solver__step=None)
+    motion = solve(system_of(case))
+    assert not motion.work.failed
+    times = np.arange(len(motion.rows)) * motion.system.interval
+    ahead = 2.0 * lack**3 / (3.0 * speed**2)
+    np.testing.assert_allclose(motion.rows[:, 0], -1.0 - lack + speed * times, atol=ahead + 1e-14, rtol=0)
+    np.testing.assert_allclose(motion.rows[1:, 2], speed, rtol=1e-14)
+
+
+@pytest.mark.parametrize("lack", 10.0 ** -np.arange(9.0, 16.0))
+def test_a_shoe_that_comes_to_all_but_stick_by_slip_goes_on(lack: float) -> None:
+    """(x - 1)² + ẋ² = 1 + (2 + ε)²: pushed by friction it has the wheel's velocity, 1 m/s, at x = -1 - ε."""
+    case = make(
+        COULOMB,
+        initial__at="rest",
+        initial__x=1.0 - math.sqrt(1.0 + (2.0 + lack) ** 2),
+        initial__y=-1.0,
+        initial__vx=0.0,
+        wheel__angular_speed=1.0,
+        solver__duration=4.0,
+        output__sample_interval=0.1,
+        solver__scheme="piecewise-exact",
+        solver__step=None,
+    )
+    assert not solve(system_of(case)).work.failed

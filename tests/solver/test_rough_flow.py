@@ -172,6 +172,25 @@ def test_the_velocity_is_that_of_differences_in_the_span() -> None:
     np.testing.assert_allclose(found.velocity / scales(system), slope / scales(system), rtol=1e-3)
 
 
+@pytest.mark.parametrize("times", [1.0, 30.0, 1000.0])
+def test_strong_dashpots_do_not_blow_up_the_steps(times: float) -> None:
+    """Dashpots of so many times critical damping: what decays within a step does not grow in it."""
+    for seed in range(6):
+        system, state, span, _ = rough_shoe(seed)
+        c = system.coefficients
+        critical = 2.0 * c.m * 2.0 * math.pi * system.natural_frequencies[1]
+        strong = c._replace(b_xx=times * critical, b_xy=0.2 * times * critical, b_yy=0.5 * times * critical)
+        system = replace(system, coefficients=strong)
+        flow = RoughFlow(system)
+        steps = default_steps(system, span)
+        runs = [flow(state, 0.0, span, finer * steps) for finer in (1, 4)]
+        assert [each.status for each in runs] == [Status.DONE, Status.DONE]
+        apart = np.abs((runs[0].state - runs[1].state) / scales(system)).max()
+        assert apart < 1e-2
+        assert runs[0].derivative is not None
+        assert np.abs(runs[0].derivative * scales(system) / scales(system)[:, None]).max() < 10.0
+
+
 # --- end ------------------------------------------------------------------------------------------------------
 
 

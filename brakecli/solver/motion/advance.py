@@ -70,7 +70,7 @@ def _part_step(p: Plant, scratch: Floats, left: float) -> int:
     to_knot = m.knot - m.base - m.time
     m.span = max(min(m.h, left, to_knot), 0.0)
     exact.expand(e, m.z, m.phase, m.span)
-    m.which, m.part = first_event(e, m.phase)
+    m.which, m.part = first_event(e, m.phase, p.c.m, m.span)
     if m.part > 0.0:
         if m.account == 1:
             exact.part_works(p.c, e, m, p.work)

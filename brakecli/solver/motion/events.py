@@ -42,8 +42,8 @@ def enter_phase(p: Plant, phase: int) -> None:
     if phase == UNDECIDED:
         exact.make(p.c, p.exact, STICK, m.h)
         m.z[V_X] = m.z[BELT]
-        pull, its_rounding = exact.hold(p.exact, PULL, m.z)
-        push, rounding = exact.hold(p.exact, PUSH, m.z)
+        pull, its_rounding = exact.hold(p.exact, PULL, m.z, p.c.m, m.h)
+        push, rounding = exact.hold(p.exact, PUSH, m.z, p.c.m, m.h)
         phase = held(pull, push, its_rounding, rounding)
     m.phase = phase
     exact.make(p.c, p.exact, phase, m.h)

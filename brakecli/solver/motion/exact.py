@@ -4,6 +4,7 @@ With U, Q and their slopes as further components, the motion is z' = A z in each
 z, and powers are quadratic in z.
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -414,15 +415,27 @@ def falls(e: Any, m: Any) -> float:
 
 
 @kernel
-def hold(e: Any, which: int, z: Floats) -> tuple[float, float]:
-    """A margin of stick (N), and by how much it may miss zero through rounding."""
+def unseen(mass: float, belt: float, slope: float) -> float:
+    """How much (N) a margin of stick may lack that rises at `slope` (N/s), so that nobody sees the shoe slip.
+
+    With the lack μ, slip reverses after 2 μ/slope, and its velocity comes to μ²/(2 m slope): to less than the
+    rounding of the velocity of the wheel, `belt` (m/s).
+    """
+    return math.sqrt(2.0 * mass * max(slope, 0.0) * ROUNDING * abs(belt))
+
+
+@kernel
+def hold(e: Any, which: int, z: Floats, mass: float, h: float) -> tuple[float, float]:
+    """A margin of stick (N), and by how much it may miss zero: by rounding, or as nobody sees what follows."""
     total = 0.0
     terms = 0.0
+    slope = 0.0
     for i in range(SIZE):
         part = e.margins[STICK, i, 4 + which] * z[i]
         total = total + part
         terms = terms + abs(part)
-    return total, 0.5 * ROUNDING * terms
+        slope += e.margins[STICK, i, 4 + MARGINS + which] * z[i]
+    return total, max(0.5 * ROUNDING * terms, unseen(mass, z[BELT], slope / h))
 
 
 @kernel(inline=False)

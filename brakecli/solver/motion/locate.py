@@ -4,7 +4,7 @@ from typing import Any
 
 from brakecli.solver.double_double import EPSILON
 from brakecli.solver.kernels import kernel
-from brakecli.solver.motion.exact import ROUNDING
+from brakecli.solver.motion.exact import ROUNDING, unseen
 from brakecli.solver.motion.phases import SOONER, STICK
 from brakecli.solver.motion.record import BELT, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
 
@@ -120,15 +120,20 @@ def _below(e: Any, allowed: float) -> float:
 
 
 @kernel(inline=False)
-def first_event(e: Any, phase: int) -> tuple[int, float]:
-    """The margin that runs out first on the series, and at which part of the span; 0 if it never was positive."""
+def first_event(e: Any, phase: int, mass: float, span: float) -> tuple[int, float]:
+    """The margin that runs out first on the series, and at which part of the span; 0 if it never was positive.
+
+    A shoe of this mass (kg) sticks although it lacks a little, see `exact.unseen`; the span is in s.
+    """
     found = NO_EVENT
     first = 1.0
     for which in range(MARGINS if phase == STICK else MARGINS - 1):
         allowed = _follow(e, phase, which)
         start = e.polynomial[0, 0]
         if start < -allowed:
-            return which, 0.0
+            if phase != STICK or start < -unseen(mass, e.series[0, BELT], e.polynomial[0, 1] / span):
+                return which, 0.0
+            allowed = -start
         right = _below(e, allowed)
         if right == 0.0:
             continue

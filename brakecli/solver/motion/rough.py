@@ -21,6 +21,7 @@ import numpy as np
 
 from brakecli import stop
 from brakecli.solver.arrays import Floats
+from brakecli.solver.coefficients import fastest_decay
 from brakecli.solver.contact.pad import aligned
 from brakecli.solver.double_double import two_product
 from brakecli.solver.motion import events as ends
@@ -36,6 +37,9 @@ from brakecli.solver.system import System
 CELLS_PER_WAVE = 24
 LEAST_CELLS = 96
 STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passes
+
+STABLE = 2.5
+"""Largest decay in a step, in powers of e: beyond 3.3 DOPRI5 multiplies what decays."""
 
 
 class Status(IntEnum):
@@ -96,9 +100,13 @@ def default_cells(system: System) -> int:
 
 
 def default_steps(system: System, span: float, per_period: float = STEPS_PER_PERIOD) -> int:
-    """Steps of a span (s), so many to the fastest period, of the shoe in full contact or of a wave that passes."""
+    """Steps of a span (s), so many to the fastest period, of the shoe in full contact or of a wave that passes.
+
+    There are more where dashpots ask for them: a step must not be long beside the fastest decay.
+    """
     fastest = max(system.natural_frequencies[1], system.passing_frequency)
-    return max(1, math.ceil(per_period * fastest * span))
+    decays = fastest_decay(system.coefficients) / STABLE
+    return max(1, math.ceil(max(per_period * fastest, decays) * span))
 
 
 class RoughFlow:
