@@ -28,9 +28,9 @@ from brakecli.solver import cache_folder, compiling
 from brakecli.solver.cache_folder import HOW, LAZY, MANIFEST, REMEDY
 
 CHILD = "child"
+"""What `HOW` says in the processes that compile all kernels."""
 OPTIMISATION = "1"
 """How much Numba optimises: its default takes a fifth more time, and nothing runs faster."""
-"""Its value in the processes that compile all of them."""
 ROOM = 30e6
 """Free bytes on a disk on which kernels are compiled beforehand; they take 6 million."""
 MOST_CHILDREN = 4

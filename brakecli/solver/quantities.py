@@ -91,7 +91,7 @@ class Failure(IntEnum):
     STALLED = (
         5,
         "the steps shrink to nothing: stick, slip, lift-off and touch-down alternate without progress, or "
-        "the tolerance is below the accuracy of the forces; increase solver.tolerance, or take two layers "
-        "with a step",
+        "the tolerance is below the accuracy of the forces; increase solver.tolerance, or take "
+        'solver.scheme = "two-layer" with a solver.step',
     )
     COARSE = 6, "the error that is carried along is more than the tolerance allows; reduce solver.tolerance"

@@ -16,7 +16,7 @@ from brakecli.case.system import system_of
 from brakecli.runs.limits import check
 from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion.tableaus import DENSE, END_STAGE, FIFTH, NODES, THIRD, USED, A
+from brakecli.solver.motion.tableaus import DENSE, END_STAGE, ERROR_WEIGHTS, NODES, THIRD, USED, A
 from brakecli.solver.quantities import HISTORY, ContactState, Failure
 from tests.campaign import counts
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
@@ -495,7 +495,9 @@ def test_a_run_on_nodes_may_be_cut_into_blocks_anywhere() -> None:
     np.testing.assert_array_equal(whole.rows, part.rows)
 
 
-@pytest.mark.parametrize(("pair", "order", "errors"), [(0, 8, ((THIRD, 3), (FIFTH, 5))), (1, 5, ((FIFTH, 4),))])
+@pytest.mark.parametrize(
+    ("pair", "order", "errors"), [(0, 8, ((THIRD, 3), (ERROR_WEIGHTS, 5))), (1, 5, ((ERROR_WEIGHTS, 4),))]
+)
 def test_the_tableaus_meet_the_order_conditions_of_quadrature(pair: int, order: int, errors: Any) -> None:
     """Σ b c^q = 1/(q + 1) and Σ a = c; the errors of lower orders vanish below these; t^q is continued exactly."""
     b = A[pair, END_STAGE, : USED[pair]]
@@ -523,9 +525,10 @@ def test_the_tableaus_meet_the_order_conditions_of_quadrature(pair: int, order: 
 
 def test_the_tableaus_are_those_of_scipy() -> None:
     """Not imported from there: that takes 0.3 s."""
-    for ours, theirs in ((A, scipy.A), (NODES, scipy.C), (THIRD, scipy.E3), (FIFTH, scipy.E5), (DENSE, scipy.D)):
+    both = [(A, scipy.A), (NODES, scipy.C), (THIRD, scipy.E3), (ERROR_WEIGHTS, scipy.E5), (DENSE, scipy.D)]
+    for ours, theirs in both:
         np.testing.assert_array_equal(ours[0, ..., : theirs.shape[-1]], theirs)
     np.testing.assert_array_equal(A[1, :6, :5], RK45.A)
     np.testing.assert_array_equal(A[1, END_STAGE, :6], RK45.B)
     np.testing.assert_array_equal(NODES[1, :6], RK45.C)
-    np.testing.assert_array_equal(FIFTH[1, [*range(6), END_STAGE]], -RK45.E)
+    np.testing.assert_array_equal(ERROR_WEIGHTS[1, [*range(6), END_STAGE]], -RK45.E)

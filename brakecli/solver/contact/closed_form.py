@@ -81,16 +81,16 @@ def full_press(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats
     n = pad.wheel_terms
     omega_at = pad.wheel_at + pad.wheel_terms
     eights = (n + 7) // 8 * 8
-    height = -pad.k * length * (pad.shoe_mean + y)
+    force = -pad.k * length * (pad.shoe_mean + y)
     sines = scratch[:eights]
     for i in range(n):
         sines[i] = tables[omega_at + i] * x + scratch[layer.angles_at + i]
     for i in range(eights):
         sines[i], _ = sine_cosine(sines[i])
     for i in range(n):
-        height += tables[pad.full_at + i] * sines[i]
+        force += tables[pad.full_at + i] * sines[i]
     # Eq. (2)
-    contact.normal_force = max(height, 0.0)
+    contact.normal_force = max(force, 0.0)
     contact.stiffness = pad.k * length
     contact.fraction = 1.0
     contact.kind = CLOSED_FORM

@@ -9,10 +9,12 @@ A propagator carries the block of a motion (`record.BLOCK`) from event to event.
 5. It hands over to `events.pass_event`, and says there whether friction holds the shoe (`events.enter_phase`).
 6. It says how the margin falls, and the rates before and behind the event (`columns.jump`).
 7. It carries `count` small disturbances in `columns`, by the derivative of the motion or of its steps.
-8. In stick the shoe is where the wheel has carried its anchor, so that it does not drift.
+8. In stick x less what the wheel has travelled stays: it is kept as the anchor, by which samples take x anew.
 9. It adds works to `work` where `account` is 1, and notes turning points in `track` where that is on.
-10. A call ends after some thousand steps, and says how (`events.DONE`): all is in the record, to go on to the bit.
+10. Its loop returns how it has ended (`events.DONE`): after many steps as well, so that Python hears signals. All
+    is in the record, to go on to the bit. What samples a loop (`samples`, `between`) returns a `Failure`.
 
-A third one has a record in the plant, a branch beside `exact` in `events.enter_phase`, `events.look` and
-`columns.jump`, a loop as `advance`, `steps` and `grid` are, and an entry in `tasks`.
+A third one has a number beside `record.MATRICES`, and a record in the plant; branches in `enter_phase`, `look`
+and `pass_event` of `events` and in `jump` and `hold_on` of `columns`; a loop as `advance`, `steps` and `grid` are,
+which finds its first phase; what samples it; and an entry in `tasks`. A case can name it once a scheme does.
 """

@@ -96,7 +96,11 @@ def _part_step(p: Plant, scratch: Floats, left: float) -> int:
 
 @kernel(inline=False)
 def advance(p: Plant, scratch: Floats, until: float, turns: bool) -> int:
-    """Carry the block until a time (s) since `base`, or until v_x next passes through zero; how the call ends."""
+    """Carry the block until a time (s) since `base`; with `turns` also until v_x has changed its sign in a step.
+
+    `begin` has found the phase, `knot` says when speed or load change their slopes, `h` is the step, and `count`,
+    `rounds`, `account`, `measures` and `limit` say what is carried along. It returns how it ends (`events`).
+    """
     m = p.block
     e = p.exact
     for _ in range(MOST_STEPS):
@@ -118,7 +122,7 @@ def advance(p: Plant, scratch: Floats, until: float, turns: bool) -> int:
             p.counts.most = 1
         rest = left - m.h
         ends = DONE
-        if rest >= -_WHOLE * m.h and m.base + m.time + m.h < m.knot and exact.whole(e, m):
+        if rest >= -_WHOLE * m.h and m.base + m.time + m.h < m.knot and exact.try_whole_step(e, m):
             m.which = NO_EVENT
             m.span = m.h
             m.part = 1.0

@@ -18,7 +18,7 @@ from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, forces
 from brakecli.solver.motion.phases import STICK
-from brakecli.solver.motion.record import COLUMNS, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.motion.record import COLUMNS, MATRICES, RUNGE_KUTTA, TERMS, V_X, V_Y, X, Y
 from brakecli.solver.plant import Plant
 
 _ERROR_TERMS = 9
@@ -105,7 +105,7 @@ def _round(e: Any, m: Any) -> None:
 def jump(p: Plant) -> bool:
     """Take the columns through the event at the end of the last step; False where it is only grazed."""
     m = p.block
-    falls = exact.falls(p.exact, m) if m.exact == 1 else forces.falls(p)
+    falls = exact.falls(p.exact, m) if m.propagator == MATRICES else forces.falls(p)
     if falls >= 0.0:
         return False
     for j in range(m.count):
@@ -120,6 +120,6 @@ def jump(p: Plant) -> bool:
 @kernel
 def hold_on(m: Any) -> None:
     """In stick nothing is left of the error of ẋ, nor of what a disturbance beside it has there."""
-    if m.phase == STICK and (m.rounds == 1 or m.exact == 0):
+    if m.phase == STICK and (m.rounds == 1 or m.propagator == RUNGE_KUTTA):
         for j in range(m.count):
             m.columns[j, V_X] = 0.0

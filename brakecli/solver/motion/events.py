@@ -19,7 +19,19 @@ from brakecli.solver.motion.phases import (
     held,
     stalled,
 )
-from brakecli.solver.motion.record import BELT, BELT_SLOPE, LOAD, LOAD_SLOPE, SIZE, V_X, V_Y, X, Y
+from brakecli.solver.motion.record import (
+    BELT,
+    BELT_SLOPE,
+    LOAD,
+    LOAD_SLOPE,
+    MATRICES,
+    RUNGE_KUTTA,
+    SIZE,
+    V_X,
+    V_Y,
+    X,
+    Y,
+)
 from brakecli.solver.plant import Plant
 from brakecli.solver.schedules import KNOT, TIME, integral_at, segment, slope_at, value_at
 from brakecli.solver.track import enter
@@ -31,12 +43,9 @@ too many steps; where v_x has passed through zero; where events do not end; far 
 
 @kernel(inline=False)
 def enter_phase(p: Plant, phase: int) -> None:
-    """Enter a phase; where it is undecided the shoe has the wheel's velocity, and the forces decide.
-
-    What rounding leaves of an event may be more than a short rest of a step allows.
-    """
+    """Enter a phase; where it is undecided the shoe gets the wheel's velocity, and forces choose stick or slip."""
     m = p.block
-    if m.exact == 0:
+    if m.propagator == RUNGE_KUTTA:
         m.phase = forces.held_phase(p) if phase == UNDECIDED else phase
         return
     if phase == UNDECIDED:
@@ -64,7 +73,7 @@ def anchor(p: Plant, scratch: Floats) -> None:
 def look(p: Plant) -> None:
     """What the next step needs to know of the motion reached."""
     m = p.block
-    if m.exact == 1:
+    if m.propagator == MATRICES:
         exact.look(p.exact, m.phase, m.z)
     else:
         forces.renew(p)
@@ -115,7 +124,7 @@ def pass_event(p: Plant, scratch: Floats) -> int:
     if stalled(m.crowded):
         return STALLED
     if m.which == HEIGHT:
-        m.z[Y] = p.layer.pad.clear_from if m.exact == 0 else 0.0
+        m.z[Y] = p.layer.pad.clear_from if m.propagator == RUNGE_KUTTA else 0.0
     enter_phase(p, following(m.phase, m.which, m.z[V_X] - m.z[BELT]))
     jumps = m.count == 0 or columns.jump(p)
     anchor(p, scratch)

@@ -201,7 +201,10 @@ def _driven(row: Floats, j: int, time: float) -> float:
 
 @kernel(inline=False)
 def make(c: Coefficients, e: Any, phase: int, h: float) -> None:
-    """The matrices of a phase for steps h: its margins M, their slopes h A' M, and exp(A h)' times all."""
+    """The matrices of a phase for steps h: its margins M, their slopes h A' M, and exp(A h)' times all.
+
+    They are made once: the step, the shoe and the stiffness of the contact stay what they are.
+    """
     if e.made[phase] > 0:
         return
     e.made[phase] = 1
@@ -370,8 +373,11 @@ def _may_dip(begin: float, slope: float, end: float, rise: float) -> bool:
 
 
 @kernel
-def whole(e: Any, m: Any) -> bool:
-    """Take a whole step, unless a margin runs out in it or may do so: Σ now_ik z_i."""
+def try_whole_step(e: Any, m: Any) -> bool:
+    """Take a whole step, Σ now_ik z_i, and return True.
+
+    Where a margin runs out in it, or may do so, the motion stays as it is, and the answer is False.
+    """
     a = e.now
     z = m.z
     if m.steady == 0:

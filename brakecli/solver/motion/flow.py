@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
-from brakecli.solver.motion.record import BELT, LOAD, V_X
+from brakecli.solver.motion.record import BELT, LOAD, MATRICES, V_X
 from brakecli.solver.motion.tasks import FLY, SEEK, SWING, advance
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
@@ -52,7 +52,7 @@ def _plants(c: Coefficients, stiffness: float, belt: float, load: float) -> Any:
     plant = plants[0]
     plant.c = filled(COEFFICIENTS, c._asdict())
     plant.exact.stiffness = stiffness
-    plant.block.exact = 1
+    plant.block.propagator = MATRICES
     plant.block.z[BELT] = belt
     plant.block.z[LOAD] = load
     plant.block.h = longest_step(c, stiffness)

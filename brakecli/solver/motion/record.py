@@ -30,6 +30,9 @@ BANDS = 2
 MOST_TURNS = 6
 """Bands of v_x, and falls of v_x through zero in a cycle, at most."""
 
+RUNGE_KUTTA, MATRICES = range(2)
+"""What propagates a motion."""
+
 BLOCK = record(
     "x y v_x v_y",  # motion at the start, or at the sample reached, m and m/s
     "force",  # normal force at the start, N
@@ -43,7 +46,7 @@ BLOCK = record(
     "square",  # integral of v_x² over the span, m²/s
     "band",  # of v_x, m/s: rises from below it to above are counted; 0 counts none
     task=int,  # see `motion.tasks`
-    exact=int,  # 1 where matrices propagate it, 0 where Runge-Kutta steps do
+    propagator=int,  # `MATRICES` or `RUNGE_KUTTA`
     phase=int,
     old=int,  # phase of the last step
     which=int,  # event at its end

@@ -106,7 +106,7 @@ def attempt(p: Plant, tables: Floats, scratch: Floats, h: float, allowed: float)
 
 @kernel(inline=False)
 def to_event(p: Plant, tables: Floats, scratch: Floats, which: int, h: float) -> float:
-    """Make the step that ends at an event, located to rounding; its length, or 0 where the contact is not closed.
+    """Make the step that ends at an event, located to rounding; its length (s), or 0 where a closed form fails.
 
     A step to where the continuous solution has it, and from there one of Newton's, so short that it is exact.
     Where a loose tolerance lets the step come to another place, it is made anew.

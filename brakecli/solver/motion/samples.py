@@ -7,7 +7,7 @@ from brakecli.solver.motion import columns, exact
 from brakecli.solver.motion.advance import advance, begin
 from brakecli.solver.motion.events import DONE, LONG, STALLED, pass_knot
 from brakecli.solver.motion.phases import CONE, OPEN, STICK, carried, side_of
-from brakecli.solver.motion.record import BELT, SIZE, V_X, V_Y, X, Y
+from brakecli.solver.motion.record import BELT, MATRICES, SIZE, V_X, V_Y, X, Y
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.schedules import integral_at, value_at
@@ -23,7 +23,7 @@ def _start(p: Plant, scratch: Floats) -> None:
     m = p.block
     p.exact.stiffness = 2.0 * p.layer.pad.half_length * p.layer.pad.k
     m.h = p.s.h
-    m.exact = 1
+    m.propagator = MATRICES
     m.z[X] = m.x
     m.z[Y] = m.y
     m.z[V_X] = m.v_x

@@ -20,6 +20,7 @@ from brakecli.solver.motion.record import (
     BELT_SLOPE,
     LOAD_SLOPE,
     POWERED,
+    RUNGE_KUTTA,
     SIZE,
     V_X,
     V_Y,
@@ -111,7 +112,7 @@ def put_at_start(p: Plant, tables: Floats, scratch: Floats) -> None:
     """Put the motion at its initial state, whose contact is to be found, see `begin`."""
     m = p.block
     r = p.runge
-    m.exact = 0
+    m.propagator = RUNGE_KUTTA
     m.account = 1
     m.which = NO_EVENT
     m.z[X] = m.x

@@ -60,18 +60,18 @@ A[1, 5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
 A[1, END_STAGE, :6] = 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 
 THIRD = np.zeros((2, STAGES))
-FIFTH = np.zeros((2, STAGES))
+ERROR_WEIGHTS = np.zeros((2, STAGES))
 DENSE = np.zeros((2, POWERS - 3, STAGES))
 THIRD[0, : END_STAGE + 1] = _numbers("""
     -0.18980075407240762 0 0 0 0 4.450312892752409 1.8915178993145003 -5.801203960010585 -0.4226823213237919
     -0.1521609496625161 0.20136540080403034 0.02265179219836082 0
 """)
-FIFTH[0, : END_STAGE + 1] = _numbers("""
+ERROR_WEIGHTS[0, : END_STAGE + 1] = _numbers("""
     0.01312004499419488 0 0 0 0 -1.2251564463762044 -0.4957589496572502 1.6643771824549864 -0.35032884874997366
     0.3341791187130175 0.08192320648511571 -0.022355307863886294 0
 """)
-FIFTH[1, :6] = (71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525)
-FIFTH[1, END_STAGE] = -1 / 40
+ERROR_WEIGHTS[1, :6] = (71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525)
+ERROR_WEIGHTS[1, END_STAGE] = -1 / 40
 """What the step differs by from formulas of order three and five, of DOPRI5 from one of order four."""
 
 DENSE[0] = _numbers("""
@@ -118,9 +118,9 @@ def local_error(r: Any, component: int) -> float:
     pair = r.pair
     for j in range(USED[pair]):
         third += THIRD[pair, j] * r.slopes[j, component]
-        fifth += FIFTH[pair, j] * r.slopes[j, component]
+        fifth += ERROR_WEIGHTS[pair, j] * r.slopes[j, component]
     if pair == 1:
-        return abs(fifth + FIFTH[1, END_STAGE] * r.slopes[END_STAGE, component])  # type: ignore[no-any-return]
+        return abs(fifth + ERROR_WEIGHTS[1, END_STAGE] * r.slopes[END_STAGE, component])  # type: ignore[no-any-return]
     size = math.sqrt(fifth * fifth + 0.01 * third * third)
     return fifth * fifth / size if size > 0.0 else 0.0
 
