@@ -35,8 +35,8 @@ ANGLES = """\
 parameter = "link2.angle_deg"
 values = [1.0, 3.0, 5.0]
 """
-SLOWER = TINY.replace("duration = 0.02", "duration = 0.6")
-"""30 ms a point."""
+SLOWER = TINY.replace("duration = 0.02", "duration = 2.4")
+"""90 ms a point."""
 WICKED = 7
 """The point that ends its worker."""
 MEMORY = 400_000_000
