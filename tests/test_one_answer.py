@@ -10,7 +10,7 @@ import tomli_w
 import brakecli
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.scattering.eigen import _asked as of_a_sample
+from brakecli.scattering.eigen import answer_of
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
 
@@ -33,7 +33,7 @@ def test_all_commands_have_the_same_critical_friction(number: int, tmp_path: Pat
             "advise": brakecli.advise(file).critical_friction,
             "branch": brakecli.branch(file, parameter={"friction.coefficient": ends}, pushes=0).attrs["critical"],
             "sweep": np.ravel(brakecli.sweep(file, critical=searched, jobs=1).critical)[0],
-            "scatter": of_a_sample(system_of(parse_case(file.read_text(), file.name).case), None)[2],
+            "scatter": answer_of(system_of(parse_case(file.read_text(), file.name).case), None)[2],
         }
         for name, answer in answers.items():
             assert answer == pytest.approx(value, rel=DIGITS), (place, name)

@@ -1,4 +1,4 @@
-"""What does a motion come to in the end? This is asked here alone, at constant speed and load."""
+"""What does a motion come to in the end, at constant speed and load?"""
 
 import math
 from collections.abc import Sequence

@@ -57,7 +57,7 @@ def _compute(plan: Plan, band: tuple[float, ...] | None, first: int, count: int)
     for place in range(count):
         try:
             with within_range():
-                found[place] = (*_asked(system_of(plan.case(plan.settings(first + place))), band), b"")
+                found[place] = (*answer_of(system_of(plan.case(plan.settings(first + place))), band), b"")
         except BrakecliError as error:
             found[place] = _failed(str(error))
     return found.tobytes()
@@ -67,7 +67,7 @@ def _failed(reason: str) -> tuple[float, float, float, bytes]:
     return math.nan, math.nan, math.nan, reason.encode()[:160].decode(errors="ignore").encode()
 
 
-def _asked(system: System, band: tuple[float, ...] | None) -> tuple[float, float, float]:
+def answer_of(system: System, band: tuple[float, ...] | None) -> tuple[float, float, float]:
     """Growth, frequency and critical friction; raises CaseError where nothing slides.
 
     A shoe that locks itself does not slide steadily: it is unstable, by what full contact makes of it.

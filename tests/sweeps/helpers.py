@@ -36,7 +36,7 @@ parameter = "link2.angle_deg"
 values = [1.0, 3.0, 5.0]
 """
 SLOWER = TINY.replace("duration = 0.02", "duration = 2.4")
-"""90 ms a point."""
+"""25 ms a point."""
 WICKED = 7
 """The point that ends its worker."""
 MEMORY = 400_000_000
