@@ -12,14 +12,18 @@ from typing import NamedTuple
 from brakecli.runs.certificate import MISSED, NOTHING, Certificate, Certified, compare, displacement
 from brakecli.runs.cost import FINEST, evaluation_seconds
 from brakecli.runs.first import FIRST, first_nodes, first_step
-from brakecli.runs.own_error import MOST_SECONDS, SAFETY, Known
+from brakecli.runs.own_error import MOST_SECONDS, SAFETY, Known, first_of
 from brakecli.solver.contact.pad import NODES
-from brakecli.solver.integrate import Motion, Work
+from brakecli.solver.integrate import Motion, Work, solve
 from brakecli.solver.method import Method
 from brakecli.solver.system import MOST_TABLE_BYTES, System
+from brakecli.solver.tangent import Exponent
 
 PART = 0.1
 """Error of the reference over the promised one."""
+OF_EXPONENT = 1e-3
+"""Tolerance of the motion whose exponent is asked beside a run with a given step; a choice. Rates of growth swing
+by far more from one part of a run to the next."""
 MOST_RUNS = 5
 """Runs of the scheme, at most."""
 AIM = 0.5
@@ -47,7 +51,12 @@ def reference_of(system: System) -> System:
     scheme = "piecewise-exact" if system.smooth else "event-driven"
     tolerance = max(PART * system.method.tolerance, FINEST)
     method = Method(scheme, tolerance=tolerance, automatic=True)
-    return replace(system, method=method, tracked=False, tangents=False)
+    return replace(system, method=method, tracked=False)
+
+
+def exponent_of(system: System) -> Exponent | None:
+    """The exponent of the motion from the start of a difference scheme, which carries none along."""
+    return solve(first_of(reference_of(system.by(step=None, tolerance=OF_EXPONENT / PART)))).exponent
 
 
 class _Tried(NamedTuple):
@@ -104,7 +113,7 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
         certified_until=0.0 if work.failed else min(until, apart.until(wanted - off)),
         method=f"{system.method.scheme} steps of {motion.system.step:.3g} s{with_nodes}, {own}",
     )
-    return Certified(motion, certificate)
+    return Certified(replace(motion, exponent=exact.exponent), certificate)
 
 
 def _finer(system: System, before: _Tried | None, tried: _Tried) -> float:

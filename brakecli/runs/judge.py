@@ -12,6 +12,7 @@ from brakecli.analysis.regime.measure import Continued, Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
 from brakecli.files.field import LARGEST
+from brakecli.runs.against import exponent_of
 from brakecli.runs.certificate import Certificate
 from brakecli.runs.settled import Judged
 from brakecli.runs.tolerance import certify
@@ -61,7 +62,10 @@ def motion_of(
     Samples go to `sink` where there is one.
     """
     if system.method.step is not None:
-        return solve(system, sink=sink, progress=progress), None
+        motion = solve(system, sink=sink, progress=progress)
+        if system.tangents and not system.method.own_steps and not motion.work.failed:
+            motion = replace(motion, exponent=exponent_of(system))
+        return motion, None
     certified = certify(system, progress)
     if sink is not None:
         sink(certified.motion.rows)

@@ -14,7 +14,6 @@ from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
-from brakecli.solver.loop import advance, take_sample
 from brakecli.solver.method import Method
 from brakecli.solver.plant import PLANT
 from brakecli.solver.quantities import HISTORY, Failure
@@ -23,8 +22,9 @@ from brakecli.solver.roughness import turn_wheel
 from brakecli.solver.schedules import Schedule, integral_at, slope_at
 from brakecli.solver.schemes import OwnStepsModule
 from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.steps.loop import advance, take_sample
 from brakecli.solver.system import System
-from brakecli.solver.tangent import FEWEST_SAMPLES, MOST_POWERS, Exponent, exponent, seed
+from brakecli.solver.tangent import FEWEST_SAMPLES, MOST_POWERS, Exponent, exponents, seed
 from brakecli.solver.track import Track, follow, tracked
 from brakecli.stop import check_signals
 
@@ -149,8 +149,9 @@ class Stepping:
         self.counts.level = self.scheme.LAG
         self.tangent = plant.tangent
         self.tangent.rate = 2.0 * math.pi * system.natural_frequencies[1]
-        if system.tangents:
-            seed(self.tangent, plant.beside.state, plant.s.h)
+        self._carries = system.tangents and system.method.own_steps
+        if self._carries:
+            seed(self.tangent)
         self._begin()
         if system.start_error is not None:
             self.tangent.knows = 1
@@ -193,8 +194,8 @@ class Stepping:
         energy = account(self._start_energy, end, self.plant.work)
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
-        carried = self.system.tangents and not work.failed and self.system.samples >= FEWEST_SAMPLES
-        found = exponent(self.tangent, self.system.sampled_duration, self.plant.s.h, lag) if carried else None
+        carried = self._carries and not work.failed and self.system.samples >= FEWEST_SAMPLES
+        found = exponents(self.tangent.logs[:, None], self.system.sampled_duration)[0] if carried else None
         track = None
         if self.system.tracked:
             track = tracked(self.plant.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)

@@ -5,7 +5,6 @@ from typing import Any
 from brakecli.solver.motion.cells import CELLS
 from brakecli.solver.motion.record import BLOCK, EXACT, PURSUIT, RUNGE
 from brakecli.solver.records import (
-    BESIDE,
     COEFFICIENTS,
     COUNTS,
     DRIVE,
@@ -36,7 +35,6 @@ PLANT = record(
     work=WORK,
     counts=COUNTS,
     tangent=TANGENT,
-    beside=BESIDE,
     track=TRACK,
 )
 """What is given to a run, and what its loop changes. The tables are those of the pad, which many motions

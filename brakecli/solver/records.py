@@ -99,14 +99,12 @@ SPANS = 64
 TANGENT = record(
     "x y v_x v_y",  # a small disturbance of the motion, m and m/s
     "rate",  # rad/s, by which places count beside velocities in its size
-    "side",  # of the friction law that the motion follows, 0 in stick
     "unsure",  # s, from which on the error may be another, as an event may have been missed; or infinite
     "moved",  # what the error moves the margin of slip (m/s) or stick (N) by, at most in the last step
     "most",  # of the error over the largest x, y, vx or vy so far: beyond it the run is not worth going on
     on=int,  # 1 where it is carried along
     knows=int,  # 1 where the error of the motion is
     beyond=int,  # 1 where it is more than the most
-    placed=int,  # events that were placed inside steps of a difference scheme
     logs=(float, PARTS),  # ln of its growth in each part of the run
     worst=(float, (SPANS, 3, 4)),  # their largest size in each span of the run, and that of their sum
 )
@@ -117,7 +115,6 @@ MOST_EVENTS = 1 << 15
 
 TRACK = record(
     "way",  # sign of the last velocity v_x that was not 0
-    "began",  # time of the last stick's begin, s
     "since",  # latest time of an event that is no longer kept, s
     on=int,  # 1 where the loop notes anything
     phase=int,  # of `motion.phases`; without contact that of flight
@@ -221,11 +218,7 @@ LAYER = record(
 )
 """The springs between shoe and wheel. Their tables are those of the pad; what is found is kept in the scratch."""
 
-BESIDE = record(state=STATE, problem=PROBLEM, contact=CONTACT, work=WORK)
-"""A step of a disturbance: the records of a step of the motion."""
-
 Layer = Any  # a record of LAYER
-Beside = Any  # a record of BESIDE
 
 
 def filled(type_: np.dtype[Any], values: Mapping[str, float]) -> Any:

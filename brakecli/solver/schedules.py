@@ -70,6 +70,8 @@ def segment(s: Schedule, t: float) -> int:
 @kernel
 def value_at(s: Schedule, t: float) -> float:
     """Value at time t (s): v_k + s_k (t - t_k) behind the knot k, with its value and slope."""
+    if s.size == KNOT:
+        return s[VALUE]  # type: ignore[no-any-return]
     k = segment(s, t)
     if k < 0:
         return s[VALUE]  # type: ignore[no-any-return]

@@ -74,7 +74,7 @@ class System:
     method: Method
     budget: int = 0  # steps until its verdict is decided, where `duration` is only the first that is tried
     notes: tuple[str, ...] = ()  # where surfaces come from, and how long a run has become
-    tangents: bool = False  # whether a small disturbance is carried along with a motion
+    tangents: bool = False  # whether a small disturbance is carried along, by schemes with steps of their own
     tracked: bool = False  # whether the loop notes works of parts, and events
     start_error: tuple[float, float] | None = None  # of x and y, m; where given, the error is carried along
     most_error: float = math.inf  # relative to the motion so far, beyond which such a run ends

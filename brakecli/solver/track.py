@@ -4,9 +4,8 @@ Works at a mark are those since the start, and the energies there are those that
 account of every part closes as that of the run does. A mark is made at a sample; that of a scheme that lags lies
 half a step behind it, and that of an event-driven motion at the end of the step that reaches the sample.
 
-Events are placed inside steps. Difference schemes place a turning point where the velocity, linear between two
-levels, vanishes; the begin of a stick where the sliding velocity does, with the acceleration before it; its end
-where the friction force that it takes is the one that there is; and contact by the rate of its force.
+Steps of the motion end at events. Those of difference schemes do not: with them a phase begins in the middle of
+the first step in it, and turning points lie where the velocity vanishes, which is linear between two levels.
 """
 
 import math

@@ -13,9 +13,8 @@ from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.measure import Continued, Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
-from brakecli.runs.judge import asked, verdict_in_memory
+from brakecli.runs.judge import asked, judged_in_memory
 from brakecli.solver.history import History, array_history
-from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Events, Track
 
@@ -34,9 +33,7 @@ def history_of(samples: int, **columns: Any) -> History:
 
 def verdict_of(case: Any) -> Verdict:
     """The verdict on the run of a case."""
-    system = asked(system_of(case))
-    motion = solve(system)
-    return verdict_in_memory(motion, system)
+    return judged_in_memory(asked(system_of(case)), lambda steps: None).verdict
 
 
 def events_from_samples(time: Array, x: Array, vx: Array, state: Array) -> Events:

@@ -323,7 +323,7 @@ def test_help_imports_no_numerical_library() -> None:
 def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     loaded = loaded_by(["run", "tiny.toml"], tmp_path)
-    assert {"numba", "h5py", "brakecli.solver.loop"} <= loaded
+    assert {"numba", "h5py", "brakecli.solver.steps.loop"} <= loaded
     unused = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.ndimage"}
     unused |= {"scipy.linalg", "numpy.f2py"}
     assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
@@ -351,7 +351,7 @@ def test_a_sweep_without_a_search_waits_for_no_kernels_of_branches(tmp_path: Pat
     axis = '[[axis]]\nparameter = "load.force"\nvalues = [1000.0, 2000.0]\n'
     (tmp_path / "sweep.toml").write_text(f'case = "tiny.toml"\n{axis}')
     loaded = loaded_by(["sweep", "sweep.toml"], tmp_path)
-    assert {"brakecli.sweeps.point", "brakecli.solver.loop"} <= loaded
+    assert {"brakecli.sweeps.point", "brakecli.solver.steps.loop"} <= loaded
     others = "solver.motion.rough", "solver.schemes.event_driven", "branches.explore"
     assert loaded.isdisjoint(f"brakecli.{name}" for name in others)
 

@@ -1,5 +1,6 @@
 """A difference scheme that is asked for a tolerance is held against one motion that knows its own error."""
 
+import math
 from dataclasses import replace
 from importlib import import_module
 from itertools import pairwise
@@ -13,6 +14,7 @@ from brakecli.case.system import system_of
 from brakecli.runs import against as room
 from brakecli.runs.against import AIM, AIM_OF_NODES, MOST, MOST_RUNS, PART, against, reference_of
 from brakecli.runs.certificate import compare
+from brakecli.runs.judge import asked, motion_of
 from brakecli.runs.tolerance import certify
 from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.method import Method
@@ -20,7 +22,7 @@ from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from tests.campaign import campaign, counts
-from tests.examples import SQUEAL, make
+from tests.examples import ROUGH, SQUEAL, make
 from tests.runs.test_tolerance import FULL, OPEN, kept, promised
 
 # benchmarks are not type-checked
@@ -73,13 +75,14 @@ def test_all_weights_keep_a_tolerance(solver: dict[str, Any]) -> None:
         assert (found.motion.system.method.scheme, found.motion.system.method.theta) == tuple(solver.values())
 
 
-def test_the_reference_is_ten_times_better_and_carries_nothing_that_only_a_verdict_asks_for() -> None:
+def test_the_reference_is_ten_times_better_and_carries_a_disturbance_where_a_verdict_asks_for_it() -> None:
     for base, scheme in ((SQUEAL, "piecewise-exact"), (OPEN, "event-driven")):
         system = system_of(promised(base, 1e-3, solver__scheme="two-layer"))
         beside = reference_of(replace(system, tracked=True, tangents=True))
         assert (beside.method.scheme, beside.method.tolerance) == (scheme, 1e-4)
         assert not beside.tracked
-        assert not beside.tangents
+        assert beside.tangents
+        assert not reference_of(system).tangents
 
 
 def runs_of(system: System) -> tuple[list[Motion], Any]:
@@ -211,3 +214,18 @@ def test_the_exact_contact_is_taken_where_nodes_are_dearer() -> None:
 
 def test_part_of_the_reference_steps_and_nodes_leave_some_of_the_promise() -> None:
     assert PART + AIM + AIM_OF_NODES < 1.0
+
+
+def test_a_difference_scheme_has_the_exponent_of_the_motion_of_the_equations() -> None:
+    """It carries none along: the motion from the same start is asked, with a tolerance the reference."""
+    system = asked(system_of(make(ROUGH, solver__duration=0.2)))
+    assert system.method.scheme == "two-layer"
+    assert solve(system).exponent is None
+    motion, _ = motion_of(system)
+    promised_, _ = motion_of(system.by(step=None, tolerance=1e-3))
+    own = solve(system.by(scheme="event-driven", step=None, tolerance=1e-8)).exponent
+    for found in (motion.exponent, promised_.exponent):
+        assert found is not None
+        assert own is not None
+        assert abs(found.rate - own.rate) <= 3.0 * math.hypot(found.error, own.error)
+    assert motion_of(replace(system, tangents=False))[0].exponent is None

@@ -14,22 +14,27 @@ from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
 from brakecli.case.tables import key_schema
 from brakecli.errors import CaseError
-from brakecli.solver import contact, schemes
+from brakecli.solver import contact, schemes, steps
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import auto, closed_form, exact, midpoint
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.implicit_step import SOLVED, newton
 from brakecli.solver.records import PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
-from brakecli.solver.schemes import event_driven, piecewise_exact, three_layer, two_layer
+from brakecli.solver.schemes import event_driven, piecewise_exact
+from brakecli.solver.steps import three_layer, two_layer
+from brakecli.solver.steps.implicit import SOLVED, newton
 from tests.solver import small_scheme
 from tests.solver.rough_gap import outputs, unfilled
 
 EVALUATORS = sorted(
     module.name for module in pkgutil.iter_modules(contact.__path__) if module.name not in ("pad", "force")
 )
-SCHEMES = sorted(module.name for module in pkgutil.iter_modules(schemes.__path__) if module.name != "steps")
+SCHEMES = sorted(
+    module.name
+    for module in pkgutil.iter_modules([*schemes.__path__, *steps.__path__])
+    if module.name not in ("loop", "step", "implicit")
+)
 STEPPING = [name.replace("-", "_") for name, row in schemes.SCHEMES.items() if not row.own_steps]
 WEIGHTS: dict[int, list[tuple[float, ...]]] = {
     0: [(), (), ()],

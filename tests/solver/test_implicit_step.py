@@ -12,11 +12,11 @@ from brakecli.case.system import system_of
 from brakecli.solver.contact.force import evaluate, fill
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.friction import minimise
-from brakecli.solver.implicit_step import SOLVED, UNCONVERGED, fixed_point, newton
 from brakecli.solver.integrate import Stepping
 from brakecli.solver.method import MOST_EVALUATIONS
 from brakecli.solver.records import PROBLEM, new
 from brakecli.solver.roughness import Surface, surface
+from brakecli.solver.steps.implicit import SOLVED, UNCONVERGED, fixed_point, newton
 from tests.campaign import campaign, counts
 from tests.examples import ROUGH, make
 

@@ -24,7 +24,7 @@ ROWS = {
     ),
     "solver/schemes/__init__.py": (
         '    "event-driven": Scheme(',
-        '    "backward-euler": Scheme("brakecli.solver.schemes.backward_euler", (Trial(),), colour="#CC79A7",'
+        '    "backward-euler": Scheme("brakecli.solver.steps.backward_euler", (Trial(),), colour="#CC79A7",'
         ' unstable="or take another scheme"),\n',
     ),
     "solver/contact/force.py": (
@@ -32,7 +32,7 @@ ROWS = {
         '    elif layer.evaluator == list(EVALUATORS).index("spring"):\n'
         "        spring.evaluate(x, y, layer, tables, scratch)\n",
     ),
-    "solver/schemes/steps.py": (
+    "solver/steps/step.py": (
         "    else:\n        three_layer.prepare(",
         '    elif p.grid.scheme == list(SCHEMES).index("backward-euler"):\n'
         "        backward_euler.prepare(p.c, p.s, state, problem)\n",
@@ -53,10 +53,10 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     package = shutil.copytree(ROOT / "brakecli", folder / "brakecli", ignore=shutil.ignore_patterns("__pycache__"))
     here = Path(__file__).parent
     shutil.copy(here / "small_evaluator.py", package / "solver/contact/spring.py")
-    shutil.copy(here / "small_scheme.py", package / "solver/schemes/backward_euler.py")
+    shutil.copy(here / "small_scheme.py", package / "solver/steps/backward_euler.py")
     for name, (before, text) in ROWS.items():
         insert(package / name, before, text)
-    steps = package / "solver/schemes/steps.py"
+    steps = package / "solver/steps/step.py"
     finish = "    else:\n        three_layer.finish("
     insert(
         steps,

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.implicit_step import newton
 from brakecli.solver.method import MOST_EVALUATIONS, Method
 from brakecli.solver.records import PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import SteppingModule
+from brakecli.solver.steps.implicit import newton
 from brakecli.solver.system import System
 
 RESOLVED = 20  # steps per period, and per passing wave, below which a warning names the number

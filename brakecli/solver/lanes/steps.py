@@ -1,7 +1,7 @@
 """A step in a lane, of the motion and of all that is carried along with it.
 
 The weights (1/12, 10/12, 1/12) are Numerov's here: they weigh positions, velocities and contact forces at the
-three levels. `schemes.three_layer` computes the force at weighted positions, and a velocity from two of them.
+three levels. `steps.three_layer` computes the force at weighted positions, and a velocity from two of them.
 That is right to h² only; here errors fall with h³.
 """
 

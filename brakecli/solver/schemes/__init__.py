@@ -8,12 +8,12 @@
 5. It says when a step takes load, travel and contact (`weighted_time`).
 6. It places kinetic energy and that of the links where it keeps them, also for arrays (`mechanical_energy`).
 
-One whose steps are those of `solver.loop`, all of one length, keeps the contract `SteppingModule`:
+One whose steps are those of `solver.steps.loop`, all of one length, keeps the contract `SteppingModule`:
 
 7. Its kernel `prepare` makes of a state the minimisation that a step comes down to.
 8. Its kernel `finish` makes the new state, with the previous position in `x_old` and `y_old`, and adds up the
    works of the step; `work.scheme` gets the energy that the step itself takes out, so that the account closes.
-9. Both have a branch in `schemes.steps`.
+9. Both have a branch in `steps.step`.
 
 One that finds its steps itself keeps the contract `OwnStepsModule`:
 
@@ -69,7 +69,7 @@ class SchemeModule(Protocol):
 
 @runtime_checkable
 class SteppingModule(SchemeModule, Protocol):
-    """What a scheme has besides whose steps are of one length: two kernels, with branches in `schemes.steps`."""
+    """What a scheme has besides whose steps are of one length: two kernels, with branches in `steps.step`."""
 
     def prepare(self, c: "Coefficients", s: "Weights", state: Any, problem: Any, /) -> None:
         """The minimisation that a step comes down to."""
@@ -123,7 +123,7 @@ class Scheme:
 
 SCHEMES: dict[str, Scheme] = {
     "two-layer": Scheme(
-        "brakecli.solver.schemes.two_layer",
+        "brakecli.solver.steps.two_layer",
         (
             Trial(HALF, contacts=True),
             Trial((1.0, 0.5)),
@@ -136,7 +136,7 @@ SCHEMES: dict[str, Scheme] = {
         unstable="or take weights that add up to 1 or more, such as [0.5, 0.5]",
     ),
     "three-layer": Scheme(
-        "brakecli.solver.schemes.three_layer",
+        "brakecli.solver.steps.three_layer",
         (
             Trial(QUARTERS),
             Trial(NUMEROV),
@@ -161,7 +161,8 @@ SCHEMES: dict[str, Scheme] = {
 
 def load(name: str) -> SchemeModule:
     """The module of a scheme; its loop is loaded before anything is timed."""
-    from brakecli.solver import kernels, loop
+    from brakecli.solver import kernels
+    from brakecli.solver.steps import loop
 
     module = cast(SchemeModule, import_module(SCHEMES[name].module))
     kernels.load(module.advance if isinstance(module, OwnStepsModule) else loop.advance)

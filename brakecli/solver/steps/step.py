@@ -4,7 +4,8 @@ from typing import Any
 
 from brakecli.solver.kernels import kernel
 from brakecli.solver.plant import Plant
-from brakecli.solver.schemes import SCHEMES, three_layer, two_layer
+from brakecli.solver.schemes import SCHEMES
+from brakecli.solver.steps import three_layer, two_layer
 
 _TWO_LAYER = list(SCHEMES).index("two-layer")
 
