@@ -16,8 +16,10 @@ from brakecli.runs.own_error import MOST_SECONDS, SAFETY, Known, first_of
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion, Work, solve
 from brakecli.solver.method import Method
-from brakecli.solver.system import MOST_TABLE_BYTES, System
+from brakecli.solver.roughness import turned
+from brakecli.solver.system import MOST_TABLE_BYTES, Initial, System
 from brakecli.solver.tangent import Exponent
+from brakecli.solver.track import Track
 
 PART = 0.1
 """Error of the reference over the promised one."""
@@ -54,9 +56,17 @@ def reference_of(system: System) -> System:
     return replace(system, method=method, tracked=False)
 
 
-def exponent_of(system: System) -> Exponent | None:
-    """The exponent of the motion from the start of a difference scheme, which carries none along."""
-    return solve(first_of(reference_of(system.by(step=None, tolerance=OF_EXPONENT / PART)))).exponent
+def exponent_of(system: System, track: Track) -> Exponent | None:
+    """The exponent beside the history of a difference scheme, which carries no disturbance along.
+
+    It is that of the motion of the equations from the state that the history has reached at its half, for as long
+    as the history lasts: what the scheme made of the way there is not asked again.
+    """
+    half = len(track.times) // 2
+    reached = Initial(*track.states[half].tolist())
+    wheel = turned(system.wheel, system.belt_speed * float(track.times[half]))
+    precise = system.by(step=None, tolerance=OF_EXPONENT / PART)
+    return solve(first_of(reference_of(replace(precise, initial=reached, wheel=wheel)))).exponent
 
 
 class _Tried(NamedTuple):

@@ -63,8 +63,8 @@ def motion_of(
     """
     if system.method.step is not None:
         motion = solve(system, sink=sink, progress=progress)
-        if system.tangents and not system.method.own_steps and not motion.work.failed:
-            motion = replace(motion, exponent=exponent_of(system))
+        if system.tangents and motion.track and not system.method.own_steps and not motion.work.failed:
+            motion = replace(motion, exponent=exponent_of(system, motion.track))
         return motion, None
     certified = certify(system, progress)
     if sink is not None:

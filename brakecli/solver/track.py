@@ -60,13 +60,13 @@ class Track:
     """What the loop has noted.
 
     `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, with one
-    row for each of the marks at `times`. `counts` has all events of each kind, also those that are no longer kept.
+    row for each of the marks at `times`. `states` has x, y (m), vx and vy (m/s) there. `counts` has all events of each kind, also those that are no longer kept.
     """
 
     times: Floats  # s
     works: Floats  # J
     stored: Floats  # J
-    places: Floats  # x at the marks, m
+    states: Floats
     counts: NDArray[np.int64]
     since: float  # all events later than that are kept, s
     kept: Events
@@ -110,7 +110,7 @@ class Track:
             return np.full((1, 4), math.nan)
         first = min(int(np.abs(self.times - begin).argmin()), len(self.times) - 2)
         works = np.diff(self.works[first:], axis=0)
-        friction = works[:, 0] - works[:, 1] - force * np.diff(self.places[first:])
+        friction = works[:, 0] - works[:, 1] - force * np.diff(self.states[first:, 0])
         roughness = works[:, 4]
         left = friction + roughness - works[:, 2] - works[:, 5]
         return np.column_stack([friction, roughness, left, np.diff(self.times[first:])])
@@ -121,7 +121,7 @@ UNTRACKED = Track(
     _NONE,
     np.zeros((0, 6)),
     np.zeros((0, 3)),
-    _NONE,
+    np.zeros((0, 4)),
     np.zeros(len(KINDS), np.int64),
     -math.inf,
     Events(_NONE, np.zeros(0, np.int8), _NONE, np.zeros((0, 3))),
@@ -149,7 +149,8 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
     order = np.argsort(t.event_times[:n], kind="stable")
     kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order], t.event_others[order])
     stored = np.column_stack([kinetic, links, contact])
-    return Track(t.times[: t.marks].copy(), works, stored, x, t.counts.copy(), float(t.since), kept)
+    states = np.column_stack([x, y, v_x, v_y])
+    return Track(t.times[: t.marks].copy(), works, stored, states, t.counts.copy(), float(t.since), kept)
 
 
 @kernel(inline=False)

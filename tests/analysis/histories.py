@@ -82,7 +82,9 @@ def track_of(history: History) -> Track:
     works = history.interval * np.cumsum(powers, axis=0)[at]
     events = events_from_samples(time, x, v_x, state)
     counts = np.bincount(events.kind, minlength=len(KINDS))
-    return Track(time[at], works, np.zeros((len(at), 3)), x[at], counts, -math.inf, events)
+    states = np.zeros((len(at), 4))
+    states[:, 0] = x[at]
+    return Track(time[at], works, np.zeros((len(at), 3)), states, counts, -math.inf, events)
 
 
 def classified(history: History, context: Context, thresholds: Thresholds | None = None, **asked: Any) -> Verdict:

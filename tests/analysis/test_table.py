@@ -273,6 +273,19 @@ def test_what_surely_takes_energy_gives_none_of_it(error: float) -> None:
     assert decide(answers(**locked), LIMITS).row == "locked to the waves: quasi-harmonic"
 
 
+@pytest.mark.parametrize("undamped", [False, True])
+@pytest.mark.parametrize(("roughness", "row"), [(-0.5, "self-excited: quasi-harmonic"), (-0.2, "either")])
+def test_where_waves_surely_take_energy_friction_gives_what_lasts(
+    roughness: float, row: str, undamped: bool
+) -> None:
+    """Its own power is known to 0.9 W, that of the waves to 0.3 W: nothing else gives, also without dashpots."""
+    unsure = {"power_of_friction": 0.6, "friction_error": 0.3, "power_of_roughness": roughness}
+    given = {**SHAKEN, **LASTS, **unsure, "undamped": undamped, "growth": 1.0}
+    assert decide(answers(**given), LIMITS).row == row
+    falls = {**given, "change": -0.5}
+    assert decide(answers(**falls), LIMITS).regime is Regime.UNDECIDED
+
+
 @pytest.mark.parametrize(
     ("left", "row"), [(0.0, "kept up by friction: quasi-harmonic"), (0.4, "energy still changes")]
 )

@@ -217,7 +217,7 @@ def test_part_of_the_reference_steps_and_nodes_leave_some_of_the_promise() -> No
 
 
 def test_a_difference_scheme_has_the_exponent_of_the_motion_of_the_equations() -> None:
-    """It carries none along: the motion from the same start is asked, with a tolerance the reference."""
+    """It carries none along: the motion from the history's half is asked, with a tolerance the reference."""
     system = asked(system_of(make(ROUGH, solver__duration=0.2)))
     assert system.method.scheme == "two-layer"
     assert solve(system).exponent is None

@@ -56,8 +56,12 @@ def comes_to_it(a: Answers, t: Thresholds) -> bool:
 
 
 def gives(a: Answers, t: Thresholds) -> bool:
-    """Friction surely gives energy, whether dashpots take it or it is stored as the motion grows."""
-    return a.power_of_friction > t.sure_errors * a.friction_error
+    """Friction surely gives energy, whether dashpots take it or it is stored as the motion grows.
+
+    Where the waves surely take energy from a level that stays, nothing but friction is left to give it.
+    """
+    alone = steady(a, t) and a.power_of_roughness < -t.sure_errors * a.roughness_error
+    return alone or a.power_of_friction > t.sure_errors * a.friction_error
 
 
 def takes(a: Answers, t: Thresholds) -> bool:

@@ -307,7 +307,6 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and apart(a, t)
             and (a.growth > 0.0 or (steady(a, t) and not another(a, t)))
             and gives(a, t)
-            and not a.undamped
         ),
         "the vibration lasts without the roughness, with a phase of its own",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
