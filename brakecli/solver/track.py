@@ -59,8 +59,9 @@ class Powers(NamedTuple):
 class Track:
     """What the loop has noted.
 
-    `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, with one
-    row for each of the marks at `times`. `states` has x, y (m), vx and vy (m/s) there. `counts` has all events of each kind, also those that are no longer kept.
+    `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, `states`
+    x, y (m), vx and vy (m/s), with one row for each of the marks at `times`. `counts` has all events of each kind,
+    also those that are no longer kept.
     """
 
     times: Floats  # s
