@@ -63,7 +63,8 @@ def exponent_of(system: System, track: Track) -> Exponent | None:
     as the history lasts: what the scheme made of the way there is not asked again.
     """
     half = len(track.times) // 2
-    reached = Initial(*track.states[half].tolist())
+    x, y, v_x, v_y = track.states[half].tolist()
+    reached = Initial(x=x, y=y, vx=v_x, vy=v_y)
     wheel = turned(system.wheel, system.belt_speed * float(track.times[half]))
     precise = system.by(step=None, tolerance=OF_EXPONENT / PART)
     return solve(first_of(reference_of(replace(precise, initial=reached, wheel=wheel)))).exponent

@@ -20,7 +20,6 @@ from brakecli.solver.quantities import HISTORY, Failure
 from brakecli.solver.records import COEFFICIENTS, GRID, WEIGHTS, Pair, filled, one
 from brakecli.solver.roughness import turn_wheel
 from brakecli.solver.schedules import Schedule, integral_at, slope_at
-from brakecli.solver.schemes import OwnStepsModule
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.steps.loop import advance, take_sample
 from brakecli.solver.system import System
@@ -144,7 +143,7 @@ class Stepping:
         self._arrays = plants, self.contact.tables, self.contact.scratch
         self._layer = plant.layer, self.contact.tables, self.contact.scratch
         self.state = plant[self.scheme.KEPT]
-        self._advance = self.scheme.advance if isinstance(self.scheme, OwnStepsModule) else advance
+        self._advance = getattr(self.scheme, "advance", advance)
         self.counts = plant.counts
         self.counts.level = self.scheme.LAG
         self.tangent = plant.tangent

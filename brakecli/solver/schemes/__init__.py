@@ -165,5 +165,5 @@ def load(name: str) -> SchemeModule:
     from brakecli.solver.steps import loop
 
     module = cast(SchemeModule, import_module(SCHEMES[name].module))
-    kernels.load(module.advance if isinstance(module, OwnStepsModule) else loop.advance)
+    kernels.load(getattr(module, "advance", loop.advance))
     return module
