@@ -12,6 +12,7 @@ from brakecli.analysis.regime.answers import Continuation
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.measure import Continued
+from brakecli.analysis.regime.seen import seen
 from brakecli.analysis.regime.spectra import forced_lines
 from brakecli.solver.history import History
 from brakecli.solver.track import MIN, SLIP, STICK, Events
@@ -81,6 +82,17 @@ def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
     assert verdict.regime is Regime.DAMPED
     assert "rest" in verdict.reasons[0]
     assert verdict.stick_fraction == 1.0
+
+
+@pytest.mark.parametrize("place", [0.1, 0.3, 0.7, 1.0 / 3.0, -12.34567, 1e-9 / 7.0])
+def test_a_shoe_at_rest_has_settled_wherever_it_rests(place: float) -> None:
+    """The mean of equal numbers may differ from them by rounding: nothing else moves there."""
+    time = INTERVAL * np.arange(6001)
+    late = time > 0.3 * time[-1]
+    x = np.where(late, place, 1.5 * place * np.cos(20.0 * time))
+    v_x = np.where(late, 0.0, -30.0 * place * np.sin(20.0 * time))
+    [found] = seen([history_of(len(time), x=x, vx=v_x)], Thresholds().settled_within)
+    assert 0 < found.settled_from * INTERVAL <= 0.4 * time[-1]
 
 
 def test_a_shoe_that_never_moves_along_a_standing_wheel_has_a_verdict_while_the_load_changes() -> None:
