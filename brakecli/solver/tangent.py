@@ -1,7 +1,7 @@
 """A small disturbance of a motion, carried along with it: does it grow or fade, and how fast?
 
 It is a column of the motion's block (`motion.columns`, `motion.errors`). A difference scheme has none: what grows
-beside its history is asked of the motion of the equations from the same start.
+beside its history, `runs.against` asks of a motion of the equations.
 """
 
 import math

@@ -13,7 +13,7 @@ from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.records import MOST_EVENTS, PARTS, WORK
-from brakecli.solver.track import LIFT, MAX, MIN, SLIP, STICK, TOUCH, TURN, Track
+from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, TURN, Track
 from tests.analysis.histories import events_from_samples
 from tests.analysis.shoes import Tables, random_shoes
 from tests.campaign import campaign
@@ -158,6 +158,16 @@ def test_events_of_a_limit_cycle_that_sticks_agree_with_exact_ones(scheme: str, 
         changes = np.concatenate([of_kind(track, kind)[0] for kind in (STICK, SLIP)])
         for t in time[other]:
             assert np.abs(changes - t).min() < 1.5 * step
+
+
+def test_event_driven_events_are_those_of_exact_steps() -> None:
+    """Of a shoe that slips, sticks and leaves the wheel."""
+    tables: Tables = next(islice(random_shoes("smooth", 5), 8, None))
+    exact, other = (track_of(by_scheme(tables, scheme, 0.0)) for scheme in ("piecewise-exact", "event-driven"))
+    assert other.counts.tolist() == exact.counts.tolist()
+    for kind in range(len(KINDS)):
+        gaps = np.abs(of_kind(other, kind)[0] - of_kind(exact, kind)[0])
+        assert 0.0 < gaps.max() < 1e-5 * tables["output"]["sample_interval"]
 
 
 @campaign

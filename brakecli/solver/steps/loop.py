@@ -1,4 +1,4 @@
-"""The only time loop: steps a state, and samples it on a fixed interval whatever the step."""
+"""The loop of schemes whose steps are of one length: it steps a state, and samples it on a fixed interval."""
 
 import math
 from typing import Any
