@@ -22,7 +22,7 @@ from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.force import evaluate
-from brakecli.solver.contact.pad import build_layer, build_pad
+from brakecli.solver.contact.pad import BESIDE, build_layer, build_pad
 from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.kernels import compiler
 from brakecli.solver.records import Layer
@@ -94,7 +94,8 @@ def in_c(system: System, nodes: int) -> tuple[Callable[[], None], Floats]:
         ]
     )
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, wheel, nodes)
-    f1 = pad.tables[pad.constants.nodes_at :][:nodes]
+    edges = pad.tables[pad.constants.nodes_at + BESIDE :][: nodes + 1]
+    f1 = 0.5 * (edges[1:] + edges[:-1])
     sums = np.zeros(6)
     arrays = [_in_lines(each) for each in (wheel.omega, f1, table.ravel(), sums, np.zeros(nodes + 6))]
     repeat.argtypes = [ctypes.c_long, *[ctypes.c_double] * 3, *[ctypes.c_void_p] * 5]

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from brakecli.solver.contact import midpoint
-from brakecli.solver.contact.pad import BESIDE, TILE, build_layer
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.integrate import Stepping
 from brakecli.solver.method import Method
 from brakecli.solver.schemes import NUMEROV
@@ -100,12 +100,12 @@ def _measured(load: Callable[[], System]) -> list[Beside]:
     system = replace(load(), method=method, interval=2.5e-5, duration=0.2)
     pad = system.pad
     spacing = 2.0 * system.half_length / NODES
-    tiles = -(-(NODES + 2 * BESIDE) // TILE)
-    waves = pad.tables[: 2 * len(system.wheel.g) * TILE * tiles].reshape(tiles, -1, 2, TILE)
-    waves = (
-        np.moveaxis(waves, 0, 2).swapaxes(0, 1).reshape(2, -1, TILE * tiles)[..., BESIDE - 1 : BESIDE + NODES + 1]
+    xi = -system.half_length + spacing * (np.arange(-1, NODES + 1) + 0.5)
+    shoe, wheel = (
+        (f.g * np.sinc(f.omega * spacing / (2.0 * np.pi)), f.omega) for f in (system.shoe, system.wheel)
     )
-    parts = [np.pad(pad.tables[pad.constants.nodes_at :][:NODES], 1), *map(np.ascontiguousarray, waves)]
+    f1 = shoe[0] @ np.sin(np.outer(shoe[1], xi) + system.shoe.phase[:, None])
+    parts = [f1, *(wheel[0][:, None] * f(np.outer(wheel[1], xi)) for f in (np.sin, np.cos))]
     omega = np.ascontiguousarray(system.wheel.omega)
     layer = build_layer(system.evaluate, pad)
     per_gap = system.layer_stiffness * spacing

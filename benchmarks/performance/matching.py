@@ -155,7 +155,7 @@ def our_ladders(system: System) -> Iterator[Ladder]:
             words = f"{scheme}, {nodes} nodes" if nodes else scheme
             yield (our_entry(system, replace(kind, step=step), f"{words}, {step:.3g} s") for step in steps)
     for nodes in (0,) if system.smooth else (64, 256, 1024, 0):
-        kind = Method("event-driven", evaluator="midpoint" if nodes else "auto", nodes=nodes)
+        kind = Method("event-driven", evaluator="cells" if nodes else "auto", nodes=nodes)
         words = f"event-driven, {nodes} nodes" if nodes else "event-driven"
         events = (10.0 ** (-k / 2) for k in range(3, 19))
         yield (our_entry(system, replace(kind, tolerance=e), f"{words}, {e:.1g}") for e in events)

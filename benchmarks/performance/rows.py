@@ -152,7 +152,7 @@ def by_waves() -> Table:
         return replace(b, interval=2.5e-4, duration=0.1, wheel=wheel)
 
     for nodes in (256, 1024):
-        on_nodes = Method("event-driven", evaluator="midpoint", nodes=nodes, tolerance=1e-4)
+        on_nodes = Method("event-driven", evaluator="cells", nodes=nodes, tolerance=1e-4)
         two_layer = Method("two-layer", (0.5, 0.5), nodes=nodes, step=2.5e-5)
         for name, method in (("three-layer", steps(nodes)), ("two-layer", two_layer), ("event-driven", on_nodes)):
             systems = [replace(rough(waves), method=method) for waves in counts]

@@ -103,7 +103,7 @@ class Contact(Table):
         'how the contact force is computed; "auto" takes the cheapest', "auto"
     )
     nodes: Annotated[int, Field(ge=2, le=10_000_000)] | None = described(
-        'quadrature nodes of "midpoint", chosen from the shortest wavelength if left out', None
+        'quadrature nodes of "cells" and "midpoint", chosen from the shortest wavelength if left out', None
     )
 
 

@@ -8,7 +8,6 @@ from typing import Any
 from brakecli.case.tables import LARGEST, SMALLEST
 from brakecli.errors import UsageError
 from brakecli.faces import argument
-from brakecli.solver.contact.pad import default_nodes
 from brakecli.solver.method import Method
 from brakecli.solver.schemes import SCHEMES
 from brakecli.solver.system import WHOLE, System
@@ -18,16 +17,17 @@ COARSEST = 16
 RUNGS = 7
 TOLERANCES: tuple[float, ...] = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9)
 ON_NODES: tuple[float, ...] = (1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
-NODE_FACTORS: tuple[float, ...] = (0.25, 0.5, 2.0, 4.0)
+NODE_FACTORS: tuple[float, ...] = (0.25, 0.5, 1.0, 2.0, 4.0)
 
 
 def method_label(kind: Method) -> str:
     """A method in a few words, without step and tolerance."""
+    nodes = f"{kind.nodes} nodes"
     words = [
         kind.scheme + (f" ({', '.join(_fraction(weight) for weight in kind.theta)})" if kind.theta else ""),
         "paper's start" if kind.start == "paper" else "",
         "fixed point" if kind.iteration == "fixed-point" else "",
-        {"midpoint": f"{kind.nodes} nodes", "exact": "exact contact"}.get(kind.evaluator, ""),
+        {"midpoint": nodes, "cells": nodes, "exact": "exact contact"}.get(kind.evaluator, ""),
     ]
     return ", ".join(filter(None, words))
 
@@ -55,8 +55,8 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     """The methods that are compared on a system, the cheapest of a scheme first; `wanted` names schemes."""
     moving = system.initial.vx != 0.0 or system.initial.vy != 0.0
     usual = "closed-form" if system.smooth else "auto"
-    nodes = system.nodes or default_nodes(system.half_length, system.shoe, system.wheel)
-    counts = [max(2, round(nodes * factor)) for factor in NODE_FACTORS]
+    plain = system.by(evaluator="midpoint")
+    counts = sorted({plain.by(nodes=round(plain.nodes * factor)).nodes for factor in NODE_FACTORS})
     found = []
     for name, scheme in SCHEMES.items():
         if scheme.exact and not system.smooth:
@@ -67,8 +67,8 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
             kind = Method(name, trial.theta, trial.start, trial.iteration)
             found.append(kind if scheme.own_steps else replace(kind, evaluator=usual, nodes=system.nodes))
             if trial.contacts and not system.smooth:
-                counted = (nodes, *counts) if scheme.own_steps else counts
-                found += [replace(kind, evaluator="midpoint", nodes=count) for count in counted]
+                on_nodes = "cells" if scheme.own_steps else "midpoint"
+                found += [replace(kind, evaluator=on_nodes, nodes=count) for count in counts]
                 found += [] if scheme.own_steps else [replace(kind, evaluator="exact")]
     return sorted(found, key=lambda kind: (kind.own_steps, kind.evaluator != usual))
 

@@ -162,7 +162,7 @@ RUN = (
     Field("certified_until", "s", "up to here the error stays below the tolerance", at="certificate."),
     Field("certified_by", "", "how the error was determined", TEXT, at="certificate.method"),
     Field("evaluators", "", "steps that each evaluator took", OBJECT, "motion.work.", group="evaluators"),
-    integer("nodes", "cells of the midpoint sum, 0 where it could not be needed", "motion.system."),
+    integer("nodes", "cells of the quadrature, 0 where it could not be needed", "motion.system."),
     integer("steps", "time steps", "motion.work."),
     integer("contact_evaluations", "evaluations of the contact force", "motion.work."),
     integer("most_evaluations_in_a_step", "most evaluations in one step", "motion.work.most_evaluations"),

@@ -120,7 +120,7 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
         marker = _MARKERS.get(entry["theta"], "P")
         if entry["evaluator"] == "exact" and not own:
             colour = _EXACT
-        elif entry["evaluator"] == "midpoint":
+        elif entry["evaluator"] in ("midpoint", "cells"):
             place = others.index(entry["nodes"]) % len(_NODE_MARKERS) if entry["nodes"] in others else -1
             colour = _OTHER_NODES
             marker = _NODE_MARKERS[place] if place >= 0 else "X"

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from brakecli.runs.certificate import MISSED, NOTHING, Certificate, Certified, compare, displacement
 from brakecli.runs.cost import FINEST, evaluation_seconds
-from brakecli.runs.first import FIRST, first_nodes, first_step
+from brakecli.runs.first import FIRST, ORDER_OF_NODES, first_nodes, first_step
 from brakecli.runs.own_error import MOST_SECONDS, SAFETY, Known, first_of
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion, Work, solve
@@ -36,7 +36,7 @@ MOST = 32.0
 LEAST = 1.25
 """By what a step becomes shorter from one run to the next, at most and at least: choices. The order says nothing
 of large errors, and a step that is hardly shorter may not change anything."""
-MOST_NODES = 64.0
+MOST_NODES = 16.0
 """By what nodes become more than those of the run that tells their error, at most; a choice, as errors may grow
 beyond all bounds. So many make an error of one a thousandth and less."""
 FAILED = 4.0
@@ -153,12 +153,12 @@ def _with_nodes(
         return system.by(nodes=nodes), spent
     wanted = system.method.tolerance
     if not seen.system.nodes:
-        on_nodes = reference_of(system).by(evaluator="midpoint", nodes=2 * nodes, tolerance=FIRST * wanted)
+        on_nodes = reference_of(system).by(evaluator="cells", nodes=2 * nodes, tolerance=FIRST * wanted)
         seen = run(replace(on_nodes, start_error=displacement(system)))
         spent = (*spent, seen.work)
     part = reference.certificate.certified_until / system.sampled_duration
     error = SAFETY * Known.of_run(seen).by_nodes(part)
-    more = min(math.sqrt(error / (AIM_OF_NODES * wanted)), MOST_NODES)
+    more = min((error / (AIM_OF_NODES * wanted)) ** (1.0 / ORDER_OF_NODES), MOST_NODES)
     nodes = max(nodes, NODES * math.ceil(more * seen.system.nodes / NODES))
     on_nodes = system.by(nodes=nodes)
     exact = system.by(evaluator="exact")

@@ -15,11 +15,11 @@ from brakecli.solver.system import System
 
 # Seconds, measured with `make cases` on one core.
 _STEP_SECONDS = 1.5e-7
-_NODE_SECONDS = 5e-10  # per node, and again per node and wave of the wheel:
-_NODE_WAVE_SECONDS = 1.5e-10
+_NODE_SECONDS = 1.2e-9  # per node, and again per node and wave of the wheel:
+_NODE_WAVE_SECONDS = 1e-10
 # with a window: as many waves; to fill it, per point and wave
 _WINDOW_WAVES = 3
-_POINT_WAVE_SECONDS = 3e-10
+_POINT_WAVE_SECONDS = 1.5e-10
 # exact, for each wave on the pad: per harmonic, and per pair of them
 _TERM_SECONDS = 2.5e-8
 _PAIR_SECONDS = 5e-10

@@ -3,14 +3,15 @@
 import math
 
 from brakecli.solver.contact import EVALUATORS
-from brakecli.solver.contact.pad import NODES, default_nodes
+from brakecli.solver.contact.pad import NODES, fewest_nodes
 from brakecli.solver.system import System
 
 FIRST = 0.2  # tolerance of the first run that knows its own error, over the requested one
 FIRST_TURN = 15.0  # square of the turn (rad) of the fastest motion in a first step, over the tolerance
 LONGEST_TURN = 0.4  # rad, in a first step
 FIRST_PER_WAVE = 8.0  # first steps to a passing wave, at least
-FINEST_FIRST = 4e-4  # tolerance from which on a quarter of the usual nodes is enough to begin with
+FINEST_FIRST = 1.6e-3  # tolerance from which on the fewest nodes are enough to begin with
+ORDER_OF_NODES = 3  # power of the spacing of nodes with which errors of cells fall
 
 
 def first_step(system: System) -> float:
@@ -20,10 +21,13 @@ def first_step(system: System) -> float:
     return min(turn / fastest, 1.0 / (FIRST_PER_WAVE * max(system.passing_frequency, 1e-300)))
 
 
-def first_nodes(system: System) -> int:
-    """The nodes that a run begins with, which hardly resolve the shortest wave; 0 where none are needed."""
+def first_nodes(system: System, order: int = 1 + ORDER_OF_NODES) -> int:
+    """The nodes that a run begins with, which hardly tell the shortest wave; 0 where none are needed.
+
+    The error that they make falls with a power of their spacing: that of few cells with the fourth.
+    """
     if system.smooth or not EVALUATORS[system.method.evaluator].needs_nodes:
         return 0
-    usual = default_nodes(system.half_length, system.shoe, system.wheel)
-    finer = max(0, int(0.5 * math.log2(FINEST_FIRST / system.method.tolerance)))
-    return max(NODES, usual // 4) << finer
+    fewest = fewest_nodes(system.half_length, system.shoe, system.wheel)
+    finer = max(0, int(math.log2(FINEST_FIRST / system.method.tolerance) / order))
+    return max(NODES, fewest) << finer

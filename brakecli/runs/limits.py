@@ -23,7 +23,7 @@ from brakecli.errors import RefusedError
 from brakecli.runs.cost import beside_seconds, duration_text, guessed, held_bytes, stability_seconds
 from brakecli.runs.price import measured
 from brakecli.runs.settled import longest
-from brakecli.solver.contact.pad import NODES_PER_WAVE
+from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.schedules import values
@@ -34,7 +34,7 @@ MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
 WORTH_SAYING = 5.0  # s, of work before which its time is said
-_COARSE_NODES = NODES_PER_WAVE / 2
+_COARSE_NODES = 0.5  # over the usual ones
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
 FILE_BYTES = 1e5  # of a result without its samples
 _PROCESS_BYTES = 2e8  # of memory, without histories and tables
@@ -190,9 +190,14 @@ def _warnings(found: Check) -> Iterator[str]:
             above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would be aliased"
             remedy = f"sample every {_down(_ABOVE_NYQUIST / frequency)} s or more often"
             yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
-    if per_wave is not None and per_wave < _COARSE_NODES:
-        remedy = f"take at least {math.ceil(system.nodes * _COARSE_NODES / per_wave)}, or leave nodes out"
-        yield f"contact.nodes: {per_wave:.3g} nodes per shortest wavelength; {remedy}"
+    if per_wave is not None:
+        coarse = _COARSE_NODES * EVALUATORS[system.evaluator].nodes_per_wave
+        asked = min(system.method.nodes or system.nodes, system.nodes)
+        if per_wave * asked < coarse * system.nodes:
+            remedy = f"take at least {math.ceil(system.nodes * coarse / per_wave)}, or leave nodes out"
+            taken = f" ({system.nodes} are taken)" if asked < system.nodes else ""
+            few = f"{per_wave * asked / system.nodes:.3g} nodes per shortest wavelength"
+            yield f"contact.nodes: {few}; {remedy}{taken}"
     yield from _of_the_scheme(system, found.limits, found.steps)
     pad = 2.0 * system.half_length
     around = 2.0 * math.pi * system.radius

@@ -14,7 +14,7 @@ import numpy as np
 
 from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, displacement, sizes
 from brakecli.runs.cost import FINEST, evaluation_seconds
-from brakecli.runs.first import FIRST, first_nodes
+from brakecli.runs.first import FIRST, ORDER_OF_NODES, first_nodes
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion
@@ -155,7 +155,8 @@ def _finer(system: System, rung: System, steps: float, by_nodes: float) -> Syste
     if at.tolerance < _BEYOND * FINEST * steps:
         return None
     tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), FINEST)
-    found = _run(system, tolerance, NODES * -int(-rung.nodes * min(by_nodes**0.5, _MOST) // NODES))
+    more = min(by_nodes ** (1.0 / ORDER_OF_NODES), _MOST)
+    found = _run(system, tolerance, NODES * -int(-rung.nodes * more // NODES))
     return found if found.method != at else None
 
 
@@ -181,4 +182,4 @@ def exact_is_cheaper(on_nodes: System, system: System) -> bool:
 
 def _on_nodes(system: System) -> System:
     """The system with its contact on nodes, where the method leaves that open."""
-    return system.by(evaluator="midpoint") if system.method.automatic and not system.smooth else system
+    return system.by(evaluator="cells") if system.method.automatic and not system.smooth else system

@@ -27,7 +27,8 @@ AT = 1e-3
 SAFETY = 3.0
 """What is promised, over the error that a run in a lane knows; docs/accuracy.md compares that with true ones."""
 ORDER = 3
-"""Least order with which errors by steps fall."""
+ORDER_OF_NODES = 2
+"""Least order with which errors by steps fall, and those by nodes, of the midpoint rule."""
 _MOST = 16.0  # times as fine, beyond which a run of its own is cheaper
 
 
@@ -36,18 +37,18 @@ def _runs(system: System) -> Generator[System, Motion, Certified]:
     fastest = 2.0 * math.pi * system.natural_frequencies[1]
     waves = FIRST_PER_WAVE * system.passing_frequency
     turn = FIRST_TURN * (system.method.tolerance / AT) ** (1.0 / ORDER)
-    nodes = 2 * first_nodes(system)
+    nodes = 2 * first_nodes(system, ORDER_OF_NODES)
     start_error = displacement(system)
 
     def rung(per_sample: float, more: float) -> System:
         step = system.interval / _few(per_sample)
         more_nodes = int(nodes * _few(more))
-        run = system.by(scheme="three-layer", theta=NUMEROV, step=step, nodes=more_nodes)
+        run = system.by(scheme="three-layer", theta=NUMEROV, step=step, nodes=more_nodes, evaluator="midpoint")
         return replace(run, start_error=start_error)
 
     def finer(run: System, steps: float, by_nodes: float) -> System | None:
         shorter = steps ** (1.0 / ORDER)
-        more = by_nodes**0.5
+        more = by_nodes ** (1.0 / ORDER_OF_NODES)
         found = rung(shorter * run.per_sample, more * run.nodes / nodes)
         return None if max(shorter, more) > _MOST or exact_is_cheaper(found, system) else found
 

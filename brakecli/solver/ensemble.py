@@ -50,10 +50,10 @@ def fits(system: System) -> Hashable | None:
     wheel = system.wheel
     sliding = system.initial.vx - system.belt_speed
     kind = method.scheme, method.theta, method.start, method.iteration, system.evaluator
-    if kind != ("three-layer", NUMEROV, "consistent", "newton", "auto") or not 0 < len(wheel.g) <= WAVES:
+    if kind != ("three-layer", NUMEROV, "consistent", "newton", "midpoint") or not 0 < len(wheel.g) <= WAVES:
         return None
     large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
-    if not system.steady or sliding == 0.0 or large or system.nodes % 2:
+    if not system.steady or sliding == 0.0 or large:
         return None
     if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
         return None
@@ -69,16 +69,17 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
     waves = np.zeros((WAVES, 3))
     table = aligned(half * (2 + 2 * WAVES)).reshape(half, -1)
     own = len(wheel.g)
-    tiles = -(-(nodes + 2 * BESIDE) // TILE)
     full_at = int(pad.full_at)
     waves_at = int(pad.waves_at)
+    columns = int(pad.columns)
     waves[:own] = np.stack([wheel.omega, wheel.phase, tables[full_at : full_at + own]], axis=1)
-    by_tiles = tables[waves_at : waves_at + tiles * own * 2 * TILE].reshape(tiles, own, 2, TILE)
-    f1 = tables[pad.nodes_at : pad.nodes_at + nodes]
+    by_tiles = tables[waves_at : waves_at + 2 * own * columns].reshape(-1, own, 2, TILE)
+    f1 = _means(tables[pad.nodes_at + BESIDE : pad.nodes_at + BESIDE + nodes + 1])
     table[:, 0] = f1[:half]
     table[:, 1] = f1[: -half - 1 : -1]
     for wave, function in np.ndindex(own, 2):
-        table[:, 2 + function * WAVES + wave] = by_tiles[:, wave, function].ravel()[BESIDE : BESIDE + half]
+        right = _means(by_tiles[:, wave, function].ravel()[: half + 1])
+        table[:, 2 + function * WAVES + wave] = right[::-1] * (-1.0, 1.0)[function]
     numbers = {
         "length": 2.0 * half_length,
         "full_up_to": float(pad.full_up_to),
@@ -87,6 +88,11 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
         "waves": waves.T,
     }
     return numbers, table
+
+
+def _means(edges: Floats) -> Floats:
+    """Means over cells from heights at their edges."""
+    return 0.5 * (edges[:-1] + edges[1:])
 
 
 def run_together(systems: Sequence[System]) -> list[Motion | None]:

@@ -1,10 +1,14 @@
-"""The heights of both surfaces at the nodes: of few waves by sums, of many from a window of the wheel.
+"""The gap between both surfaces at the edges of cells: of few waves by sums, of many from a window of the wheel.
 
-The nodes are equally spaced, so that on a grid that divides their spacing all of them lie at one place between two
-points: each height is a sum of `POINTS` heights on the grid, with weights that all nodes share (Lagrange's).
+Cells are equally long, so that on a grid that divides their length all edges lie at one place between two
+points: each height is a sum of `POINTS` heights on the grid, with weights that all edges share (Lagrange's).
 The window holds the grid below the pad and ahead of it. Sums of waves fill it, once for each point that passes, so
 that their number hardly matters, nor how long a run lasts; a height does not depend on what was evaluated before.
 `contact.pad.interpolation_error` bounds the error.
+
+A wave is even or odd about the middle of the pad, so that tables of one half are enough. They are cut into tiles
+of a constant number of edges, which stay in the cache while all waves are added. What is known of a place is kept:
+a shoe that sticks stays at one.
 """
 
 import math
@@ -12,7 +16,7 @@ import math
 import numpy as np
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.contact.pad import BESIDE, POINTS, TILE
+from brakecli.solver.contact.pad import BESIDE, POINTS, RISE, TILE
 from brakecli.solver.double_double import two_product
 from brakecli.solver.kernels import FAST, kernel, stopped
 from brakecli.solver.records import Layer
@@ -26,15 +30,28 @@ WEIGHTS = np.array([-((-1.0) ** i) * math.comb(POINTS - 1, i) / math.factorial(P
 
 
 @kernel(fastmath=FAST)
-def _add_wave(f2: Floats, table: Floats, s: float, c: float) -> None:
-    """Add g sin(ωξ + ψ) at the nodes of a tile, by addition from the tables of g sin(ωξ) and g cos(ωξ)."""
-    for j in range(TILE):
-        f2[j] += c * table[j] + s * table[j + TILE]
+def _add_wave(even: Floats, odd: Floats, table: Floats, s: float, c: float) -> None:
+    """Add the wave s g cos(ωξ) + c g sin(ωξ), with s = sin ψ and c = cos ψ: its even part and its odd part."""
+    for j in range(even.size):
+        even[j] += s * table[j + TILE]
+        odd[j] += c * table[j]
 
 
 @kernel(fastmath=FAST)
-def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
-    """Add five waves at once: f2 is read and written only once."""
+def _add_two(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
+    """Add two waves at once."""
+    s_0 = s[0]
+    s_1 = s[1]
+    c_0 = c[0]
+    c_1 = c[1]
+    for j in range(even.size):
+        even[j] += s_0 * table[j + TILE] + s_1 * table[j + 3 * TILE]
+        odd[j] += c_0 * table[j] + c_1 * table[j + 2 * TILE]
+
+
+@kernel(fastmath=FAST)
+def _add_five(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) -> None:
+    """Add five waves at once: both parts are read and written only once."""
     s_0 = s[0]
     s_1 = s[1]
     s_2 = s[2]
@@ -45,58 +62,98 @@ def _add_five(f2: Floats, table: Floats, s: Floats, c: Floats) -> None:
     c_2 = c[2]
     c_3 = c[3]
     c_4 = c[4]
-    for j in range(TILE):
-        one = c_0 * table[j] + s_0 * table[j + TILE] + c_1 * table[j + 2 * TILE] + s_1 * table[j + 3 * TILE]
-        two = (
-            c_2 * table[j + 4 * TILE]
-            + s_2 * table[j + 5 * TILE]
-            + c_3 * table[j + 6 * TILE]
-            + s_3 * table[j + 7 * TILE]
-        )
-        f2[j] += one + two + c_4 * table[j + 8 * TILE] + s_4 * table[j + 9 * TILE]
+    for j in range(even.size):
+        one = s_0 * table[j + TILE] + s_1 * table[j + 3 * TILE] + s_2 * table[j + 5 * TILE]
+        even[j] += one + (s_3 * table[j + 7 * TILE] + s_4 * table[j + 9 * TILE])
+        two = c_0 * table[j] + c_1 * table[j + 2 * TILE] + c_2 * table[j + 4 * TILE]
+        odd[j] += two + (c_3 * table[j + 6 * TILE] + c_4 * table[j + 8 * TILE])
 
 
 @kernel
-def phases(x: float, layer: Layer, tables: Floats, scratch: Floats) -> tuple[int, int]:
-    """Sine and cosine of the phase ωx + ψ of each wave, eight at a time; where in the scratch they begin."""
+def eights(layer: Layer) -> int:
+    """Sines of the waves, to whole lanes; as many cosines follow."""
+    return (layer.pad.wheel_terms + 7) // 8 * 8  # type: ignore[no-any-return]
+
+
+@kernel
+def _turn(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """Sine and cosine of the phase ωx + ψ of each wave, eight at a time."""
     pad = layer.pad
     waves = layer.pad.wheel_terms
-    at = pad.nodes + 2 * BESIDE + 2 * TILE
     omega_at = pad.wheel_at + waves
-    eights = (waves + 7) // 8 * 8
-    sines = scratch[at : at + eights]
-    cosines = scratch[at + eights : at + 2 * eights]
+    number = eights(layer)
+    sines = scratch[pad.sines_at : pad.sines_at + number]
+    cosines = scratch[pad.sines_at + number : pad.sines_at + 2 * number]
     for i in range(waves):
         sines[i] = tables[omega_at + i] * x + scratch[layer.angles_at + i]
-    for i in range(eights):
+    for i in range(number):
         sines[i], cosines[i] = sine_cosine(sines[i])
-    return at, at + eights
 
 
 @kernel
-def _sum_waves(x: float, f2: Floats, layer: Layer, tables: Floats, scratch: Floats) -> None:
-    """f2 = Σ g sin(ω(ξ + x) + ψ) where the shoe is at x, in whole tiles."""
+def _is_known(x: float, level: int, layer: Layer) -> bool:
+    """Whether so much is known of a place; what is known of another one is forgotten."""
+    if x != layer.place:
+        layer.place = x
+        layer.known = 0
+    if layer.known >= level:
+        return True
+    layer.known = level
+    return False
+
+
+@kernel
+def phases(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """Sines and cosines of all waves where the shoe is at x; without a window."""
+    if not _is_known(x, 1, layer):
+        _turn(x, layer, tables, scratch)
+
+
+@kernel
+def _sum_waves(columns: int, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """Both parts of f2 = Σ g sin(ωξ + ψ) in so many columns of the tables."""
     pad = layer.pad
-    sines_at, cosines_at = phases(x, layer, tables, scratch)
-    sines = scratch[sines_at:cosines_at]
-    cosines = scratch[cosines_at : 2 * cosines_at - sines_at]
     waves = pad.wheel_terms
+    number = eights(layer)
+    sines = scratch[pad.sines_at : pad.sines_at + number]
+    cosines = scratch[pad.sines_at + number : pad.sines_at + 2 * number]
     at = pad.waves_at
-    for begin in range(0, f2.size, TILE):
+    for begin in range(0, columns, TILE):
         if stopped(pad.signals):
             return
-        tile = f2[begin : begin + TILE]
+        width = min(TILE, (columns - begin + 7) // 8 * 8)
+        even = scratch[pad.parts_at + begin : pad.parts_at + begin + width]
+        odd = scratch[pad.parts_at + pad.columns + begin : pad.parts_at + pad.columns + begin + width]
+        for j in range(width):
+            even[j] = odd[j] = 0.0
         i = 0
-        for j in range(TILE):
-            tile[j] = 0.0
         while i + 5 <= waves:
-            _add_five(tile, tables[at : at + 10 * TILE], sines[i : i + 5], cosines[i : i + 5])
+            _add_five(even, odd, tables[at : at + 10 * TILE], sines[i : i + 5], cosines[i : i + 5])
             i = i + 5
             at = at + 10 * TILE
-        while i < waves:
-            _add_wave(tile, tables[at : at + 2 * TILE], sines[i], cosines[i])
-            i = i + 1
+        while i + 2 <= waves:
+            _add_two(even, odd, tables[at : at + 4 * TILE], sines[i : i + 2], cosines[i : i + 2])
+            i = i + 2
+            at = at + 4 * TILE
+        if i < waves:
+            _add_wave(even, odd, tables[at : at + 2 * TILE], sines[i], cosines[i])
             at = at + 2 * TILE
+
+
+@kernel(fastmath=FAST)
+def _place_sums(gap: Floats, f1: Floats, middle: int, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """f2 - f1 about a middle, from the turned waves."""
+    pad = layer.pad
+    _sum_waves(middle + 1, layer, tables, scratch)
+    even = scratch[pad.parts_at : pad.parts_at + middle + 1]
+    odd = scratch[pad.parts_at + pad.columns : pad.parts_at + pad.columns + middle + 1]
+    ahead = gap[middle:]
+    f1_ahead = f1[middle:]
+    for j in range(ahead.size):
+        ahead[j] = even[j] + odd[j] - f1_ahead[j]
+    for j in range(middle + 1):
+        i = np.uint64(middle - j)  # an index that can be negative takes four times as long
+        gap[i] = even[j] - odd[j] - f1[i]
 
 
 @kernel
@@ -106,11 +163,14 @@ def _fill(tile: int, layer: Layer, tables: Floats, scratch: Floats) -> None:
     window = layer.window
     n = layer.pad.wheel_terms
     angles = scratch[layer.angles_at : layer.angles_at + n]
-    travel, travel_low = two_product(-float(TILE * tile), window.rows * window.spacing)
+    middle = TILE * tile + TILE // 2 - BESIDE - pad.nodes // 2
+    travel, travel_low = two_product(-float(middle), window.rows * window.spacing)
     turn_to(tables[pad.turns_at : pad.turns_at + 3 * n], travel, travel_low, angles)
     for row in range(window.rows):
         at = window.at + row * window.width + TILE * (tile - window.origin)
-        _sum_waves(row * window.spacing, scratch[at : at + TILE], layer, tables, scratch)
+        _turn(row * window.spacing, layer, tables, scratch)
+        nothing = tables[pad.nothing_at : pad.nothing_at + TILE]
+        _place_sums(scratch[at : at + TILE], nothing, TILE // 2, layer, tables, scratch)
 
 
 @kernel
@@ -133,7 +193,7 @@ def _cover(low: int, high: int, layer: Layer, tables: Floats, scratch: Floats) -
 
 @kernel
 def _row(point: int, layer: Layer) -> int:
-    """Where the heights begin at a point of the grid and, a node's spacing further each, at those that follow."""
+    """Where the heights begin at a point of the grid and, a cell further each, at those that follow."""
     window = layer.window
     column = (point >> window.shift) - TILE * window.origin
     return window.at + (point & (window.rows - 1)) * window.width + column  # type: ignore[no-any-return]
@@ -153,9 +213,9 @@ def _weigh(part: float, weights: Floats) -> None:
 
 
 @kernel(fastmath=FAST)
-def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer, scratch: Floats) -> None:
-    """f2 as the weighted sum of `POINTS` heights, the first at a point of the grid."""
-    size = f2.size
+def _add_rows(begin: int, w: Floats, gap: Floats, f1: Floats, layer: Layer, scratch: Floats) -> None:
+    """f2 - f1, with f2 as the weighted sum of `POINTS` heights, the first at a point of the grid."""
+    size = gap.size
     r_0 = scratch[_row(begin, layer) :]
     r_1 = scratch[_row(begin + 1, layer) :]
     r_2 = scratch[_row(begin + 2, layer) :]
@@ -185,34 +245,58 @@ def _add_rows(begin: int, w: Floats, f2: Floats, layer: Layer, scratch: Floats) 
         two = w_3 * r_3[j] + w_4 * r_4[j] + w_5 * r_5[j]
         three = w_6 * r_6[j] + w_7 * r_7[j] + w_8 * r_8[j]
         four = w_9 * r_9[j] + w_10 * r_10[j] + w_11 * r_11[j]
-        f2[j] = one + two + three + four
+        gap[j] = one + two + three + four - f1[j]
 
 
 @kernel
-def _interpolate(x: float, f2: Floats, layer: Layer, tables: Floats, scratch: Floats) -> None:
-    """f2 where the shoe is at x, from the window."""
+def _interpolate(x: float, gap: Floats, f1: Floats, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """f2 - f1 where the shoe is at x, from the window."""
     window = layer.window
     shift = layer.window.shift
     place = (x - window.travel) / window.spacing
     whole = np.floor(place)
     point = whole - window.points
     begin = (int(point) if abs(point) < FARTHEST else 0) - POINTS // 2 + 1
-    last = (begin + POINTS - 1 >> shift) + f2.size - 1
+    last = (begin + POINTS - 1 >> shift) + gap.size - 1
     _cover((begin >> shift) // TILE, last // TILE, layer, tables, scratch)
     weights = scratch[window.at - POINTS : window.at]
     _weigh(max(place - whole, 1e-200), weights)  # at no point, where it would divide by zero
-    _add_rows(begin, weights, f2, layer, scratch)
+    _add_rows(begin, weights, gap, f1, layer, scratch)
 
 
 @kernel
-def profiles(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
-    """The heights f2 at the nodes and beside them, from the begin of the scratch on.
+def gaps(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """The gap f2 - f1 at the edges and beside them, from the begin of the scratch on.
 
-    They are not to be used where the process is to end. Those of f1 are in the tables.
+    It is not to be used where the process is to end.
     """
-    n = layer.pad.nodes
-    f2 = scratch[: (n + 2 * BESIDE + TILE - 1) // TILE * TILE]
+    pad = layer.pad
+    width = pad.nodes + 1 + 2 * BESIDE
+    gap = scratch[:width]
+    f1 = tables[pad.nodes_at : pad.nodes_at + width]
     if layer.window.rows == 0:
-        _sum_waves(x, f2, layer, tables, scratch)
-    else:
-        _interpolate(x, f2[: n + 2 * BESIDE], layer, tables, scratch)
+        phases(x, layer, tables, scratch)
+        if not _is_known(x, 2, layer):
+            _place_sums(gap, f1, pad.nodes // 2 + BESIDE, layer, tables, scratch)
+    elif not _is_known(x, 2, layer):
+        _interpolate(x, gap, f1, layer, tables, scratch)
+
+
+@kernel(fastmath=FAST)
+def _find_rises(gap: Floats, rises_of_f1: Floats, found: Floats) -> None:
+    """f2' times a cell at the edges, by a polynomial through four neighbours on each side."""
+    for j in range(found.size):
+        one = RISE[0] * (gap[j + 5] - gap[j + 3]) + RISE[1] * (gap[j + 6] - gap[j + 2])
+        two = RISE[2] * (gap[j + 7] - gap[j + 1]) + RISE[3] * (gap[j + 8] - gap[j])
+        found[j] = one + two + rises_of_f1[j]
+
+
+@kernel
+def rises(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
+    """`gaps`, and behind them f2' times a cell at the edges, m."""
+    pad = layer.pad
+    edges = pad.nodes + 1
+    gaps(x, layer, tables, scratch)
+    if not _is_known(x, 3, layer):
+        rises_of_f1 = tables[pad.rises_at : pad.rises_at + edges]
+        _find_rises(scratch[: edges + 2 * BESIDE], rises_of_f1, scratch[pad.parts_at : pad.parts_at + edges])

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from brakecli.solver.motion.cells import CELLS
 from brakecli.solver.motion.record import BLOCK, EXACT, PURSUIT, RUNGE
 from brakecli.solver.records import (
     COEFFICIENTS,
@@ -29,7 +28,6 @@ PLANT = record(
     block=BLOCK,  # that of one with events, and what goes along with it
     exact=EXACT,  # its matrices
     runge=RUNGE,  # its Runge-Kutta step
-    cells=CELLS,  # and the rough pad of one
     way=PURSUIT,  # to its orbit
     problem=PROBLEM,
     work=WORK,

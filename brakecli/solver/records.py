@@ -149,7 +149,10 @@ PAD = record(
     edges_at=int,  # where in the scratch what is known of them begins
     shoe_terms=int,  # harmonics
     wheel_terms=int,
-    nodes=int,  # of the midpoint rule; 0 without its tables
+    nodes=int,  # cells, an even number; 0 without their tables
+    columns=int,  # edges of cells in one half of the tables, in whole tiles
+    parts_at=int,  # where in the scratch begin: even and odd parts of heights, or rises, behind the heights
+    sines_at=int,  # sines and cosines of the phases of the waves
     signals=int,  # where to see that a signal has come, see `kernels.stopped`
     gap_at=int,  # where in the tables begin: amplitudes, wavenumbers, phases of f2 - f1
     wheel_at=int,  # amplitudes and wavenumbers of the wheel
@@ -157,19 +160,20 @@ PAD = record(
     ss_at=int,  # integrals of products, see `contact.pad`
     cc_at=int,
     pr_at=int,
-    opposite_at=int,  # f1 at the nodes of one half and at those opposite, tile by tile
-    nodes_at=int,  # f1 at the nodes
-    waves_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at the nodes, tile by tile
+    nodes_at=int,  # f1 at the edges of cells and beside them
+    rises_at=int,  # f1' times a cell at the edges, m
+    nothing_at=int,  # zeros, as many as edges in a tile
+    waves_at=int,  # g sin(ωξ) and g cos(ωξ) of the wheel at those from the middle on, tile by tile
     turns_at=int,  # phases (rad) and waves per metre of the wheel, the latter as sums of two doubles
-    rows=int,  # points of a window's grid to a node, a power of two; 0 where sums of waves are as fast
+    rows=int,  # points of a window's grid to a cell, a power of two; 0 where sums of waves are as fast
 )
 
 WINDOW = record(
     "spacing",  # of the grid, m
     "points travel",  # that the wheel has travelled: points of the grid, a whole number, and the rest, m
-    rows=int,  # points to a node; 0 where there is no window
+    rows=int,  # points to a cell; 0 where there is no window
     shift=int,  # their binary logarithm
-    width=int,  # nodes, in whole tiles
+    width=int,  # cells, in whole tiles
     at=int,  # where in the scratch it begins, row by row; weights lie before it
     origin=int,  # its first tile
     first=int,  # the tiles that are filled, from this one on
@@ -210,6 +214,8 @@ DRIVE = record(belt_at=int, belt_end=int, load_at=int, load_end=int)
 """Where in the scratch the knots of the speed U of the wheel's surface and of the load Q begin and end."""
 
 LAYER = record(
+    "place",  # x (m) that the heights in the scratch belong to
+    known=int,  # of that place: 0 nothing, 1 phases of the waves, 2 heights, 3 also their rises
     evaluator=int,  # place in `contact.EVALUATORS`
     angles_at=int,  # where in the scratch the phases of the wheel's harmonics begin, rad
     pad=PAD,

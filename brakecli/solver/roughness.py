@@ -117,6 +117,7 @@ def turn(travel: float, travel_low: float, layer: Layer, tables: Floats, scratch
     window = layer.window
     at = layer.pad.turns_at
     n = layer.pad.wheel_terms
+    layer.known = 0
     if window.rows == 0:
         angles = scratch[layer.angles_at : layer.angles_at + n]
         turn_to(tables[at : at + 3 * n], travel, travel_low, angles)

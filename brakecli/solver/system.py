@@ -11,7 +11,7 @@ from brakecli.errors import RefusedError
 from brakecli.solver import contact, schemes
 from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, window_rows, window_width
+from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, fewest_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST_EVALUATIONS, Method
 from brakecli.solver.records import Weights
@@ -100,7 +100,7 @@ class System:
         """Memory of the contact: values at nodes, a window, two numbers for each pair of waves."""
         terms = len(self.shoe.g) + len(self.wheel.g)
         nodes = self.nodes
-        at_nodes = nodes * (2.0 * len(self.wheel.g) + 3.0) + self.window_rows * window_width(nodes)
+        at_nodes = nodes * (len(self.wheel.g) + 3.0) + self.window_rows * window_width(nodes)
         return 8.0 * (at_nodes + 2.0 * terms**2)
 
     @property
@@ -130,10 +130,12 @@ class System:
 
     @cached_property
     def nodes(self) -> int:
-        """Quadrature nodes; 0 where no quadrature can be needed."""
+        """Quadrature nodes, an even number that tells the shortest wave; 0 where no quadrature can be needed."""
         if not contact.EVALUATORS[self.evaluator].needs_nodes:
             return 0
-        return self.method.nodes or default_nodes(self.half_length, self.shoe, self.wheel)
+        pad = self.half_length, self.shoe, self.wheel
+        asked = self.method.nodes or default_nodes(self.evaluator, *pad)
+        return max(asked + asked % 2, fewest_nodes(*pad))
 
     @property
     def scheme(self) -> schemes.SchemeModule:

@@ -126,7 +126,7 @@ def test_a_limit_cycle_that_settles_by_its_dashpots_alone_is_not_settled(
 
 def test_a_vibration_that_waves_modulate_has_not_settled_before_they_have_beaten() -> None:
     """By another integrator it has twice this frequency later. 2.542 Hz less three times 0.785 Hz is 1/5.33 s."""
-    verdict = judged("waves that beat under stick-slip")
+    verdict = judged("waves that beat under stick-slip", contact__nodes=1024)
     assert (verdict.regime, verdict.settled) == (Regime.RELAXATION, False)
     assert "the waves beat every 5.33 s: run at least 7.8" in verdict.reasons[1]
 
@@ -178,14 +178,14 @@ def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
     "name", [pytest.param("ripple of 64 nodes", marks=campaign), "ripple in the force", "nothing but ripple"]
 )
 def test_ripple_of_the_nodes_is_named_and_gone_with_the_nodes_that_are_asked_for(name: str) -> None:
-    verdict = judged(name)
+    verdict = judged(name, contact__evaluator="midpoint")
     assert verdict.settled is False
     told = re.search(r"ripple of the contact's \d+ nodes .*; take contact.nodes = (\d+)", verdict.reasons[-1])
     assert told is not None
     if name == "nothing but ripple":
         assert verdict.evidence["ripple_vx"] > 0.9
         return
-    finer = judged(name, contact__nodes=int(told[1]))
+    finer = judged(name, contact__evaluator="midpoint", contact__nodes=int(told[1]))
     assert "ripple" not in finer.reasons[-1]
     assert verdict.amplitude_spread is not None
     assert abs(verdict.amplitude - finer.amplitude) <= 1.5 * verdict.amplitude_spread
@@ -196,7 +196,7 @@ def test_ripple_of_the_nodes_is_named_and_gone_with_the_nodes_that_are_asked_for
 
 def test_what_lies_beside_the_lines_of_a_forced_motion_is_ripple_if_nodes_ripple() -> None:
     """The mean stiffness misses the resonance of the open pad: it makes 9 % of vx of what is 98 %."""
-    verdict = judged("ripple on the frequency of an open pad")
+    verdict = judged("ripple on the frequency of an open pad", contact__evaluator="midpoint")
     assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, False)
     # By another integrator with 300 to 1200 nodes: vx is 2.5e-5 m/s, of 1.4e-4 with ripple, amplitude 8.2e-7 m.
     assert verdict.evidence["ripple_vx"] == pytest.approx(math.sqrt(1.0 - (2.5 / 14.0) ** 2), abs=0.01)
@@ -377,8 +377,8 @@ def test_a_forced_motion_has_settled_after_the_time_that_is_asked_for() -> None:
     assert told is not None
     again = judged("forced, not yet", float(told[1]) / duration)
     assert (again.excitation, ASKED.search(" ".join(again.reasons))) == (Excitation.FORCED, None)
-    # The same four times later, by another integrator.
-    assert again.amplitude == pytest.approx(7.70e-6, rel=0.01)
+    # The same four times later, by the event-driven scheme with the exact contact.
+    assert again.amplitude == pytest.approx(7.471e-6, rel=0.01)
 
 
 @pytest.mark.parametrize("name", ["forced from the start", "forced from the start, waves shorter than its period"])
@@ -563,7 +563,11 @@ def test_where_an_amplitude_ends_is_not_said_of_a_run_that_does_not_show_it(name
 )
 def test_a_reason_says_no_more_than_is_known(name: str, says: str, not_this: str | None) -> None:
     """By another integrator: a line at 294 Hz lasts for 40 runs, the pad opens again, and so on."""
-    reasons = " ".join(judged(name).reasons)
+    # The plain rule on these nodes lets a pad rest in full contact; with cells, or more nodes, it opens again.
+    plain: dict[str, Any] = (
+        {"contact__evaluator": "midpoint", "contact__nodes": 256} if "beat opens" in name else {}
+    )
+    reasons = " ".join(judged(name, **plain).reasons)
     assert re.search(says, reasons)
     assert not_this is None or not_this not in reasons
 

@@ -100,7 +100,7 @@ def test_a_run_that_is_too_large_is_refused_with_its_size(here: Path) -> None:
     check.told(3, "about 1e+12 steps", "2.66 days", "6.5e+06 MB")
     nodes = ["--set", "contact.nodes=10000000", "--set", "contact.evaluator='midpoint'"]
     waves = ["--set", "roughness.wheel={amplitudes=[1e-6], wavelengths=[1e-2]}"]
-    several = f"roughness.wheel={{amplitudes={[1e-6] * 30}, wavelengths={[0.01] * 30}}}"
+    several = f"roughness.wheel={{amplitudes={[1e-6] * 60}, wavelengths={[0.01] * 60}}}"
     brakecli("run", "tiny.toml", *nodes, "--set", several, cwd=here).told(3, "contact.nodes")
     brakecli("run", "tiny.toml", *nodes, *waves, *LONG, cwd=here).told(3, "the run is too long")
     assert left_in(here) == {"tiny.toml"}

@@ -37,7 +37,7 @@ def test_stability_costs_averages_of_the_contact_only_where_the_pad_opens_and_is
         return system_of(make(SQUEAL | {"roughness": {"wheel": waves}}))
 
     assert stability_seconds(system_of(make(SQUEAL))) == stability_seconds(waved(10, 1e-9)) == 0.0
-    few, many = (stability_seconds(waved(count, 1e-3)) for count in (10, 100))
+    few, many = (stability_seconds(waved(count, 1e-3)) for count in (10, 50))
     assert 0.0 < many < few  # places that are near each other have a window
     few, many = (stability_seconds(waved(count, 1e-3, 20.0)) for count in (10, 100))
     assert many > 5.0 * few > 0.0

@@ -131,7 +131,7 @@ def test_surfaces_that_open_keep_their_tolerance_too(tolerance: float) -> None:
     found = certify(system_of(case))
     assert found.certificate.certified
     assert kept(found, case, 1e-4 * tolerance) <= tolerance
-    assert found.motion.system.evaluator == ("midpoint" if tolerance > 1e-6 else "exact")  # by what is cheaper
+    assert found.motion.system.evaluator == ("cells" if tolerance > 1e-6 else "exact")  # by what is cheaper
 
 
 def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
@@ -139,7 +139,8 @@ def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
     lucky = {"wheel": {"amplitudes": [4.37e-4], "wavelengths": [0.00941]}}
     case = promised({**OPEN, "roughness": lucky}, 1e-3, solver__duration=1e-4, output__sample_interval=4e-6)
     method = {"scheme": "two-layer", "theta": (0.5, 0.5), "tolerance": None, "step": 4e-6}
-    few, more, most = (simulate(changed(case, solver=method, contact={"nodes": n})) for n in (64, 128, 4096))
+    contacts = ({"evaluator": "midpoint", "nodes": n} for n in (64, 128, 4096))
+    few, more, most = (simulate(changed(case, solver=method, contact=each)) for each in contacts)
     assert errors(few.rows, more.rows).error < 1e-9 < 1e-2 < errors(more.rows, most.rows).error
     found = certify(system_of(case))
     assert found.certificate.certified
@@ -208,7 +209,7 @@ def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
             assert found.certificate.certified
             assert error <= found.certificate.estimated_error + 1e-7  # what the truth itself may be off
             ways.add(f"{found.motion.system.method.scheme}, {found.motion.system.evaluator}")
-    everything = {"event-driven, exact", "event-driven, midpoint", "piecewise-exact, closed-form"}
+    everything = {"event-driven, exact", "event-driven, cells", "piecewise-exact, closed-form"}
     assert many < 10 or ways == everything
 
 
@@ -296,8 +297,8 @@ def test_an_evaluator_that_is_named_is_kept(given: dict[str, Any]) -> None:
         case = promised(OPEN, 1e-3, contact__evaluator=evaluator, **given)
         found[evaluator] = {*certify(system_of(case)).motion.work.evaluators}
     assert "exact" in found["exact"]
-    assert "midpoint" not in found["exact"]
-    assert ("midpoint" in found["auto"]) == (not given)  # the program takes nodes where it is cheaper
+    assert "cells" not in found["exact"]
+    assert ("cells" in found["auto"]) == (not given)  # the program takes nodes where it is cheaper
 
 
 def test_runs_whose_steps_are_limited_by_passing_waves_do_not_vouch_for_each_other() -> None:

@@ -1,24 +1,31 @@
 """The contact force, its derivatives, its store: evaluators against quadrature, identities and each other."""
 
 import math
+from functools import partial
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 
-from brakecli.solver.contact import midpoint
+from brakecli.case.system import system_of
+from brakecli.solver.contact import CELLS, CLOSED_FORM, cells
+from brakecli.solver.contact import EVALUATORS as ROWS
 from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage, full_contact, full_press
 from brakecli.solver.contact.force import fill
-from brakecli.solver.contact.pad import NODES_PER_WAVE, build_layer, build_pad, default_nodes
+from brakecli.solver.contact.pad import build_layer, build_pad, default_nodes
 from brakecli.solver.roughness import Surface, surface
 from tests.campaign import campaign, counts
+from tests.examples import ROUGH, make
 from tests.solver.rough_gap import EPS, EVALUATORS, Gap, Wave, gaps, outputs, unfilled
 
 # Case B of the roughness: five waves on each surface.
 CASE_B_SHOE = (Wave(30e-6, 0.020), Wave(21e-6, 0.011), Wave(15e-6, 0.007), Wave(9e-6, 0.005), Wave(6e-6, 0.003))
 CASE_B_WHEEL = (Wave(30e-6, 0.025), Wave(24e-6, 0.013), Wave(18e-6, 0.008), Wave(12e-6, 0.006), Wave(6e-6, 0.004))
+
+DEFAULT_RMS = {"midpoint": (1e-4, 4e-4), "cells": (1e-5, 4e-4)}
 
 
 def case_b(x: float, y: float, travel: float) -> Gap:
@@ -58,7 +65,7 @@ def test_exact_agrees_with_quadrature_between_the_roots(gap: Gap) -> None:
     assert (found.kind, found.valid) == (2, 1)
 
 
-@given(gaps(-3.0, -1.001, most=4))
+@given(gaps(-3.0, -1.01, most=4))
 def test_the_evaluators_agree_where_the_pad_touches_everywhere(gap: Gap) -> None:
     closed, exact, auto = (gap.evaluate(name) for name in ("closed-form", "exact", "auto"))
     height = abs(gap.y) + gap.crest
@@ -74,7 +81,7 @@ def test_the_evaluators_agree_where_the_pad_touches_everywhere(gap: Gap) -> None
     )
 
 
-@given(gaps(-3.0, -1.0), st.sampled_from(EVALUATORS))
+@given(gaps(-3.0, -1.01), st.sampled_from(EVALUATORS))
 def test_a_fully_touching_pad_obeys_the_closed_form(gap: Gap, evaluator: str) -> None:
     def mean(waves: tuple[Wave, ...], shift: float) -> float:
         total = 0.0
@@ -90,14 +97,14 @@ def test_a_fully_touching_pad_obeys_the_closed_form(gap: Gap, evaluator: str) ->
     assert found == pytest.approx(expected, rel=0, abs=1e-12 * gap.force_scale)
 
 
-@given(gaps(1.0, 3.0), st.sampled_from(EVALUATORS))
+@given(gaps(1.01, 3.0), st.sampled_from(EVALUATORS))
 def test_an_open_pad_gives_nothing_at_all(gap: Gap, evaluator: str) -> None:
     found = gap.evaluate(evaluator)
     np.testing.assert_array_equal(outputs(found), 0.0)
     assert found.valid == 1
 
 
-@given(gaps(-3.0, -1.0), st.floats(-0.01, 0.01), st.sampled_from(EVALUATORS))
+@given(gaps(-3.0, -1.01), st.floats(-0.01, 0.01), st.sampled_from(EVALUATORS))
 def test_the_shoe_s_own_roughness_drops_out_of_full_contact_but_for_a_constant(
     gap: Gap, dx: float, evaluator: str
 ) -> None:
@@ -166,9 +173,11 @@ def test_the_midpoint_error_falls_with_the_square_of_the_spacing() -> None:
 
 
 @campaign
-def test_default_nodes_keep_the_force_to_a_few_parts_in_ten_thousand() -> None:
-    """The figure that NODES_PER_WAVE is chosen by: rms 3e-4 of 2ak (sum of amplitudes) over random surfaces and
-    positions. It can never exceed 2 pi/(4 NODES_PER_WAVE²): two roots per shortest wave, slopes <= 2 pi/wave.
+@pytest.mark.parametrize("name", ["midpoint", "cells"])
+def test_default_nodes_keep_the_force_to_a_few_parts_in_ten_thousand(name: str) -> None:
+    """The figure that `nodes_per_wave` is chosen by: rms 3e-4 of 2ak (sum of amplitudes) over random surfaces and
+    positions. With n nodes to a wave that of midpoint can never exceed 2 pi/(4 n²): two roots per shortest wave,
+    slopes <= 2 pi/wave.
     """
     rng = np.random.default_rng(21)
     errors = []
@@ -182,20 +191,115 @@ def test_default_nodes_keep_the_force_to_a_few_parts_in_ten_thousand() -> None:
         )
         a = 10 ** rng.uniform(-2.3, -1.0)
         gap = Gap(shoe, wheel, a, 0.0, 0.0)
-        pad = gap.pad(default_nodes(a, *gap.surfaces))
+        pad = gap.pad(default_nodes(name, a, *gap.surfaces))
         for _ in range(10):
             at = Gap(shoe, wheel, a, rng.uniform(-1e-3, 1e-3), rng.uniform(-1, 1) * gap.crest, rng.uniform(0, 1))
-            forces = [at.evaluate(name, pad=pad).normal_force for name in ("midpoint", "exact")]
+            forces = [at.evaluate(each, pad=pad).normal_force for each in (name, "exact")]
             errors.append((forces[0] - forces[1]) / (2 * a * gap.k * (gap.crest or 1.0)))
     assert len(errors) == 2000
-    assert 1e-4 < np.sqrt(np.mean(np.square(errors))) < 4e-4  # measured 2.6e-4
-    assert max(map(abs, errors)) < 2 * math.pi / (4 * NODES_PER_WAVE**2)
+    assert DEFAULT_RMS[name][0] < np.sqrt(np.mean(np.square(errors))) < DEFAULT_RMS[name][1]
+    assert max(map(abs, errors)) < 2 * math.pi / (4 * ROWS[name].nodes_per_wave ** 2)
 
 
 @pytest.mark.parametrize(("waves", "nodes"), [((), 64), ((0.1,), 64), ((0.1, 0.02), 128), ((0.001,), 1600)])
 def test_default_nodes_resolve_the_shortest_wave(waves: tuple[float, ...], nodes: int) -> None:
     rough = surface([1e-6] * len(waves), wavelengths=waves)
-    assert default_nodes(0.05, rough, surface()) == default_nodes(0.05, surface(), rough) == nodes
+    found = [default_nodes("midpoint", 0.05, *surfaces) for surfaces in ((rough, surface()), (surface(), rough))]
+    assert found == [nodes, nodes]
+
+
+# --- cells against exact -------------------------------------------------------------------------------------
+
+
+def open_gap(rng: np.random.Generator) -> Gap:
+    """Up to four waves on each surface, 6 to 100 mm long, at any height at which the pad may touch in part."""
+    sides = [
+        tuple(
+            Wave(rng.uniform(5e-6, 5e-5), 0.006 * 16.0 ** rng.uniform(), rng.uniform(0, 360))
+            for _ in range(rng.integers(1, 5))
+        )
+        for _ in range(2)
+    ]
+    gap = Gap(sides[0], sides[1], 0.05, rng.uniform(-1e-3, 1e-3), 0.0, rng.uniform(0, 1))
+    return Gap(gap.shoe, gap.wheel, gap.a, gap.x, 0.9 * rng.uniform(-1, 1) * gap.crest, gap.travel)
+
+
+@pytest.mark.parametrize("many", counts(300, 1000))
+def test_the_error_of_cells_falls_with_the_third_power_of_their_length(many: int) -> None:
+    """In the force. An edge of a patch is misplaced by what bends the gap, with the second power: so are
+    stiffness, fraction and ∂F_y/∂x. The store is the integral of the force over the height, ∂V/∂x that of ∂F_y/∂x.
+    """
+    rng = np.random.default_rng(50)
+    nodes = (128, 256, 512, 1024)
+    errors = np.zeros((many, len(nodes), 6))
+    for i in range(many):
+        gap = open_gap(rng)
+        exact = outputs(gap.evaluate("exact"))
+        steep = gap.steepest(wheel_only=True)
+        size = 2 * gap.a * gap.k * np.array([gap.crest, 1, steep, 0, gap.crest**2, gap.crest * steep])
+        size[3] = 1.0
+        errors[i] = [(outputs(gap.evaluate("cells", nodes=n)) - exact) / size for n in nodes]
+    mean = np.mean(np.abs(errors), axis=0)
+    orders = -np.polyfit(np.log2(nodes), np.log2(mean), 1)[0]
+    assert np.all(orders > np.array([3.0, 2.0, 2.0, 2.0, 3.0, 3.0]) - 0.1)
+    assert mean[0, 0] < 3e-5  # with 7.7 cells to the shortest wave; measured 1.7e-5
+
+
+@pytest.mark.parametrize("many", counts(40, 400))
+def test_what_cells_leave_out_is_known(many: int) -> None:
+    """It is the error of the force but for the fifth power, patches and holes within a cell included. Without the
+    part of fourth power it would be off by as much as it is: that of third power is small where a gap is zero.
+    """
+    rng = np.random.default_rng(51)
+    nodes = (256, 512)
+    left = np.zeros((many, 2))
+    errors = np.zeros((many, 2))
+    for i in range(many):
+        gap = open_gap(rng)
+        exact = gap.evaluate("exact").normal_force
+        for j, n in enumerate(nodes):
+            layer = build_layer("cells", gap.pad(n))
+            layer.angles[:] = gap.angles
+            fill(gap.x, gap.y, *layer)
+            errors[i, j] = (exact - layer.contact.normal_force) / gap.force_scale
+            left[i, j] = cells.left_out(gap.y, layer.layer, layer.scratch) / gap.force_scale
+    rms = np.sqrt(np.mean(errors**2, axis=0))
+    off = np.sqrt(np.mean((left - errors) ** 2, axis=0))
+    assert np.all(off < [0.05 * rms[0], 0.02 * rms[1]])
+    assert math.log2(off[0] / off[1]) > 4.0
+
+
+def test_a_patch_and_a_hole_within_a_cell_are_known() -> None:
+    """A wave of which only the crest touches, or does not, 1/300 of its height deep: 0.6 of a cell long.
+
+    With 24 cells to a wave, z = π/24, a parabola through the heights misses a crest by some z⁴ = 3e-4 of its
+    height, a tenth of the depth or less, whatever of the patch the cells see.
+    """
+    missed = []
+    for sign in (1.0, -1.0):
+        for shift in np.linspace(0.0, 1.0, 12):  # of a cell
+            wheel = (Wave(sign * 1e-5, 0.02, 0.0),)
+            gap = Gap((), wheel, 0.05, 0.02 * shift / 24.0, sign * 1e-5 * (1.0 - 1.0 / 300.0))
+            deep = Gap((), wheel, gap.a, gap.x, -2e-5)
+            whole = gap.evaluate("exact").normal_force
+            if sign < 0.0:  # the hole
+                whole -= gap.k * (deep.evaluate("exact").normal_force / gap.k - 2 * gap.a * (gap.y + 2e-5))
+            layer = build_layer("cells", gap.pad(120))
+            layer.angles[:] = gap.angles
+            fill(gap.x, gap.y, *layer)
+            off = gap.evaluate("exact").normal_force - layer.contact.normal_force
+            assert abs(off - cells.left_out(gap.y, layer.layer, layer.scratch)) < 0.1 * whole
+            missed.append(abs(off) / whole)
+    assert max(missed) > 0.3
+    assert min(missed) < 0.3
+
+
+def test_few_nodes_tell_the_shortest_wave() -> None:
+    for length, nodes, taken in ((0.01, 2, 40), (0.01, 41, 42), (1.0, 2, 2), (1.0, 3, 4), (0.001, 64, 400)):
+        rough = {"amplitudes": [1e-6], "wavelengths": [length]}
+        system = system_of(make(ROUGH, roughness__wheel=rough, roughness__shoe=None, contact__nodes=nodes))
+        assert system.half_length == 0.05
+        assert system.nodes == taken
 
 
 # --- derivatives ---------------------------------------------------------------------------------------------
@@ -285,7 +389,7 @@ def test_auto_changes_over_without_a_jump_in_the_force(gap: Gap) -> None:
         kinds.append((forces[0].kind, forces[1].kind))
         tolerance = 2 * gap.a * gap.k * gap.rounding * (1 + gap.sines[0].size)
         assert forces[0].normal_force == pytest.approx(forces[1].normal_force, rel=0, abs=tolerance)
-    assert kinds[2] == (0, 1)
+    assert kinds[2] == (CLOSED_FORM, CELLS)
 
 
 @given(gaps(most=0), st.floats(-1e-3, 1e-3))
@@ -588,27 +692,38 @@ def test_waves_of_almost_equal_length_lose_no_digits(apart: float) -> None:
         assert found.store == pytest.approx(expected, rel=0, abs=2 * full.a * full.k * 1.2e-4 * full.rounding)
 
 
-@pytest.mark.parametrize(("waves", "nodes"), [(1, 128), (5, 128), (7, 577), (0, 64), (5, 3), (5, 145)])
+def press(x: float, y: float, *layer: Any, steeply: bool) -> None:
+    """`cells.press`, with its last argument by name."""
+    cells.press(x, y, layer[0], layer[1], layer[2], steeply)
+
+
+@pytest.mark.parametrize(("waves", "nodes"), [(1, 128), (5, 128), (7, 576), (0, 64), (5, 2), (5, 146)])
 def test_the_force_alone_is_that_of_the_whole_evaluation(waves: int, nodes: int) -> None:
     """Of nodes, whatever is open, and of the closed form; sums in another order differ by their rounding."""
     rng = np.random.default_rng(41)
     more = Wave(4e-6, 0.0031), Wave(3e-6, 0.0027)
     gap = Gap((*CASE_B_SHOE, *more), (*CASE_B_WHEEL, *more)[:waves], 0.05, 0.0, 0.0, 0.0, 5e7)
     pad = gap.pad(nodes)
-    pairs = {
-        "midpoint": (midpoint.evaluate, midpoint.press),
-        "closed-form": (full_contact, full_press),
-    }
-    for name, (whole, alone) in pairs.items():
+    pairs: list[tuple[str, Any, Any]] = [
+        ("cells", cells.evaluate, partial(press, steeply=False)),
+        ("cells", cells.evaluate, partial(press, steeply=True)),
+        ("closed-form", full_contact, full_press),
+    ]
+    for name, whole, alone in pairs:
         layers = [build_layer(name, pad) for _ in range(2)]
         for _ in range(50):
             x = rng.uniform(-0.02, 0.02)
-            y = gap.crest * (rng.uniform(-1, 1) if name == "midpoint" else -2.0)
+            y = gap.crest * (rng.uniform(-1, 1) if name == "cells" else -2.0)
             for evaluate, layer in zip((whole, alone), layers, strict=True):
                 layer.angles[:] = gap.angles
                 evaluate(x, y, *layer)
             one, other = (layer.contact for layer in layers)
             rounding = (128 + nodes) * EPS * 2 * gap.a * gap.k * gap.crest
             assert other.normal_force == pytest.approx(one.normal_force, rel=0, abs=4.0 * rounding)
-            assert (other.stiffness, other.fraction) == (one.stiffness, one.fraction)
+            np.testing.assert_allclose(other.stiffness, one.stiffness, rtol=nodes * EPS)
+            np.testing.assert_allclose(other.fraction, one.fraction, rtol=nodes * EPS)
+            if getattr(alone, "keywords", {"steeply": True})["steeply"]:
+                steep = gap.steepest(wheel_only=True)
+                apart = 4.0 * rounding * (steep / gap.crest + nodes / gap.a)
+                assert other.tangential == pytest.approx(one.tangential, rel=0, abs=apart)
             assert (other.kind, other.valid) == (one.kind, one.valid)

@@ -16,7 +16,7 @@ from brakecli.case.tables import key_schema
 from brakecli.errors import CaseError
 from brakecli.solver import contact, schemes, steps
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.contact import auto, closed_form, exact, midpoint
+from brakecli.solver.contact import auto, cells, closed_form, exact, midpoint
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.records import PROBLEM, WORK, Weights, new
@@ -123,7 +123,7 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         valid += filled.valid == 1
         kinds.add(contact.kinds()[filled.kind])
     assert valid > 50
-    assert kinds <= {name.replace("_", "-")} if name != "auto" else kinds == {"closed-form", "midpoint"}
+    assert kinds <= {name.replace("_", "-")} if name != "auto" else kinds == {"closed-form", "cells"}
 
 
 @pytest.mark.parametrize("name", EVALUATORS)
@@ -145,7 +145,7 @@ COEFFICIENTS = Coefficients(10.0, 300.0, -20.0, 200.0, 2e7, -1e6, 1e7, 0.0, 1.0,
 # mypy holds these modules to the signatures
 STEPS: list[schemes.SteppingModule] = [two_layer, three_layer, small_scheme]
 OWN_STEPS: list[schemes.OwnStepsModule] = [event_driven, piecewise_exact]
-CONTACTS: list[contact.EvaluatorModule] = [auto, closed_form, exact, midpoint]
+CONTACTS: list[contact.EvaluatorModule] = [auto, cells, closed_form, exact, midpoint]
 
 
 @pytest.mark.parametrize("name", SCHEMES)

@@ -440,7 +440,7 @@ SMALL = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
 
 def on_nodes(case: Case, tolerance: float, nodes: int = 256) -> Motion:
     """The motion of a case by steps on nodes instead of the exact contact."""
-    return solve(system_of(case), Method("event-driven", evaluator="midpoint", nodes=nodes, tolerance=tolerance))
+    return solve(system_of(case), Method("event-driven", evaluator="cells", nodes=nodes, tolerance=tolerance))
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3, 1e-4, 1e-6])
@@ -454,7 +454,7 @@ def test_steps_on_nodes_keep_their_tolerance(base: dict[str, Any], tolerance: fl
     fine = on_nodes(case, 1e-11)
     found = on_nodes(case, tolerance)
     assert error(found.rows, fine.rows) <= 2.0 * tolerance
-    assert found.work.evaluators["midpoint"] > 5
+    assert found.work.evaluators["cells"] > 5
     assert abs(found.energy.relative_closing_error) <= tolerance
 
 
@@ -487,9 +487,7 @@ def test_nodes_that_all_touch_make_the_motion_of_the_exact_contact(
 
 def test_a_run_on_nodes_may_be_cut_into_blocks_anywhere() -> None:
     case = event_driven(OPEN, solver__duration=0.002)
-    system = replace(
-        system_of(case), method=Method("event-driven", evaluator="midpoint", nodes=64, tolerance=1e-3)
-    )
+    system = replace(system_of(case), method=Method("event-driven", evaluator="cells", nodes=64, tolerance=1e-3))
     whole = Stepping(system).run(first_block=10**6)
     part = Stepping(system).run(first_block=1)
     np.testing.assert_array_equal(whole.rows, part.rows)

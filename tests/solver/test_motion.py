@@ -258,7 +258,7 @@ def test_closed_form_refuses_a_pad_that_may_open() -> None:
 
 def test_auto_takes_the_closed_form_where_the_pad_touches_and_says_so() -> None:
     work = simulate(make(ROUGH, load__force=5000.0, solver__duration=0.2)).work
-    assert set(work.evaluators) == {"closed-form", "midpoint"}
+    assert set(work.evaluators) == {"closed-form", "cells"}
     assert sum(work.evaluators.values()) == work.steps
     assert simulate(make(SQUEAL)).work.evaluators == {"closed-form": 10000}
 

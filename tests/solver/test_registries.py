@@ -66,7 +66,7 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
     )
     for path, words in (
         (steps, "three_layer, two_layer"),
-        (package / "solver/contact/force.py", "auto, closed_form, exact"),
+        (package / "solver/contact/force.py", "auto, closed_form, exact, midpoint"),
     ):
         own = "backward_euler" if path is steps else "spring"
         path.write_text(path.read_text().replace(f"{words}\n", f"{words}, {own}\n", 1))
@@ -128,7 +128,7 @@ def test_an_evaluator_on_nodes_is_not_taken_where_a_tolerance_chooses_nodes_itse
     shutil.copytree(copy, tmp_path, dirs_exist_ok=True)
     registry = tmp_path / "brakecli/solver/contact/__init__.py"
     row = '"brakecli.solver.contact.spring"'
-    registry.write_text(registry.read_text().replace(row, f"{row}, needs_nodes=True"))
+    registry.write_text(registry.read_text().replace(row, f"{row}, nodes_per_wave=8"))
     overrides = "--set", "solver={tolerance=1e-3, duration=0.02}", "--set", 'contact.evaluator="spring"'
     done = call(tmp_path, "check", "own.toml", *overrides)
     assert done.returncode == 2

@@ -66,7 +66,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
     @cache
     def stiffness() -> float:  # in the mean, for which nodes are good enough, and thirty times cheaper
         by_nodes = system.method.own_steps and system.finds_patches
-        on_nodes = replace(system, method=replace(system.method, evaluator="midpoint")) if by_nodes else system
+        on_nodes = replace(system, method=replace(system.method, evaluator="cells")) if by_nodes else system
         try:
             return steady_sliding(on_nodes, belt=belt).stiffness
         except CaseError:  # none: a shoe that locks itself drifts away, by what full contact makes of it

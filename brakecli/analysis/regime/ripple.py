@@ -43,7 +43,7 @@ class Ripple(NamedTuple):
 
     @property
     def sentence(self) -> str:
-        """What it is, and what to do: it falls with the square of the number of nodes."""
+        """What it is, and what to do: it falls with the square of the number of nodes, or with a higher power."""
         enough = self.nodes * 2 ** math.ceil(0.5 * math.log2(max(self[:3]) / _LEAST) + 0.5)
         parts = f"{self.x:.0%} of x, {self.vx:.0%} of vx and {self.force:.0%} of the friction force"
         return f"ripple of the contact's {self.nodes} nodes is {parts}; take contact.nodes = {enough}"

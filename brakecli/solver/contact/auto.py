@@ -2,8 +2,8 @@
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM, EVALUATORS
+from brakecli.solver.contact.cells import evaluate as cells
 from brakecli.solver.contact.closed_form import CLEAR, FULL, PARTLY, clear, coverage, full_contact
-from brakecli.solver.contact.midpoint import evaluate as midpoint
 from brakecli.solver.kernels import kernel
 from brakecli.solver.records import Layer
 
@@ -12,10 +12,10 @@ _AUTO = list(EVALUATORS).index("auto")
 
 @kernel
 def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
-    """Closed form where a bound proves the pad to touch everywhere or nowhere, otherwise the midpoint rule.
+    """Closed form where a bound proves the pad to touch everywhere or nowhere, otherwise cells.
 
     On a pad that touches everywhere it has the same force, and with a window it takes less time. A layer that
-    names the midpoint rule takes that in any case.
+    names cells takes these in any case.
     """
     covered = coverage(y, layer.pad) if layer.evaluator == _AUTO else PARTLY
     if covered == FULL and layer.window.rows == 0:
@@ -23,6 +23,6 @@ def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) 
     elif covered == CLEAR:
         clear(layer.contact)
     else:
-        midpoint(x, y, layer, tables, scratch)
+        cells(x, y, layer, tables, scratch)
         if covered == FULL:  # their sum is the closed form
             layer.contact.kind = CLOSED_FORM

@@ -5,9 +5,9 @@ from typing import Any
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
+from brakecli.solver.heights import eights, phases
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.records import Layer
-from brakecli.solver.sine import sine_cosine
 
 CLEAR = 0
 PARTLY = 1
@@ -31,14 +31,14 @@ def full_contact(x: float, y: float, layer: Layer, tables: Floats, scratch: Floa
     length = 2.0 * pad.half_length
     n = pad.wheel_terms
     omega_at = pad.wheel_at + n
+    cosines_at = pad.sines_at + eights(layer)
     full_at = pad.full_at
     ss_at = pad.ss_at
     cc_at = pad.cc_at
     pr_at = pad.pr_at
-    sines = scratch[:n]
-    cosines = scratch[n : 2 * n]
-    for i in range(n):
-        sines[i], cosines[i] = sine_cosine(tables[omega_at + i] * x + scratch[layer.angles_at + i])
+    phases(x, layer, tables, scratch)
+    sines = scratch[pad.sines_at : pad.sines_at + n]
+    cosines = scratch[cosines_at : cosines_at + n]
     # k ∫ (f2 - f1) and its derivative by x
     mean_force = -k * length * pad.shoe_mean
     tangential = 0.0
@@ -74,24 +74,23 @@ def full_contact(x: float, y: float, layer: Layer, tables: Floats, scratch: Floa
 
 @kernel
 def full_press(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
-    """`full_contact` for a run that takes no derivatives by x: normal force, stiffness 2ak and fraction 1."""
+    """`full_contact` without what is stored."""
     pad = layer.pad
     contact = layer.contact
     length = 2.0 * pad.half_length
     n = pad.wheel_terms
-    omega_at = pad.wheel_at + pad.wheel_terms
-    eights = (n + 7) // 8 * 8
+    omega_at = pad.wheel_at + n
+    cosines_at = pad.sines_at + eights(layer)
     force = -pad.k * length * (pad.shoe_mean + y)
-    sines = scratch[:eights]
+    tangential = 0.0
+    phases(x, layer, tables, scratch)
     for i in range(n):
-        sines[i] = tables[omega_at + i] * x + scratch[layer.angles_at + i]
-    for i in range(eights):
-        sines[i], _ = sine_cosine(sines[i])
-    for i in range(n):
-        force += tables[pad.full_at + i] * sines[i]
+        force += tables[pad.full_at + i] * scratch[pad.sines_at + i]
+        tangential += tables[pad.full_at + i] * tables[omega_at + i] * scratch[cosines_at + i]
     # Eq. (2)
     contact.normal_force = max(force, 0.0)
     contact.stiffness = pad.k * length
+    contact.tangential = tangential
     contact.fraction = 1.0
     contact.kind = CLOSED_FORM
     contact.valid = 1

@@ -1,11 +1,11 @@
 """The normal force by the evaluator that a layer names: a branch for each."""
 
 from brakecli.solver.arrays import VECTOR, Floats
-from brakecli.solver.contact import EVALUATORS, auto, closed_form, exact
+from brakecli.solver.contact import EVALUATORS, auto, closed_form, exact, midpoint
 from brakecli.solver.kernels import entry, kernel
 from brakecli.solver.records import LAYER, Layer
 
-_CLOSED_FORM, _EXACT = (list(EVALUATORS).index(name) for name in ("closed-form", "exact"))
+_CLOSED_FORM, _EXACT, _MIDPOINT = map(list(EVALUATORS).index, ("closed-form", "exact", "midpoint"))
 
 
 @kernel
@@ -19,6 +19,8 @@ def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) 
         closed_form.evaluate(x, y, layer, tables, scratch)
     elif layer.evaluator == _EXACT:
         exact.evaluate(x, y, layer, tables, scratch)
+    elif layer.evaluator == _MIDPOINT:
+        midpoint.evaluate(x, y, layer, tables, scratch)
     else:
         auto.evaluate(x, y, layer, tables, scratch)
 

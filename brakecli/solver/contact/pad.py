@@ -12,18 +12,20 @@ import numpy as np
 
 from brakecli import stop
 from brakecli.solver.arrays import Floats
-from brakecli.solver.contact import place_of
+from brakecli.solver.contact import EVALUATORS, place_of
 from brakecli.solver.records import LAYER, PAD, Layer, new
 from brakecli.solver.roughness import Surface, height
 
 TILE = 72
-BESIDE = 3
-"""Nodes of a piece of the tables, and nodes beyond each end of the pad."""
+"""Edges of cells in a piece of the tables of the wheel."""
+RISE: tuple[float, ...] = 4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0
+BESIDE = len(RISE)
+"""What differences of heights at the edges to both sides make of a slope, and edges beyond each end of the pad."""
 
 MOST_SUMMED = 10
-"""Waves of the wheel up to which their sums at all nodes are as fast as a window."""
+"""Waves of the wheel up to which their sums at all edges are as fast as a window."""
 ROWS: tuple[int, ...] = 1, 2, 4, 8, 16
-"""Points of the grid of a window to a node."""
+"""Points of the grid of a window to a cell."""
 POINTS = 12
 INTERPOLATED = 1e-15
 """Points from which a height in a window is interpolated, and its largest error over the sum of amplitudes,
@@ -38,9 +40,6 @@ BOUND_POINTS = 64
 MOST_BOUND_POINTS = 10**6
 """Points for each of the shortest waves at which the shoe's profile is bounded, and all of them at most."""
 
-NODES_PER_WAVE = 16
-"""Nodes per shortest wavelength that `nodes` is chosen for; measured in tests/solver/test_contact.py."""
-
 NODES = 64
 """Fewest nodes, of which all numbers of nodes are multiples; a choice."""
 
@@ -48,10 +47,19 @@ PIECE = 100_000
 """Pairs of waves, or nodes, that tables are made of at a time: signals are heard in between."""
 
 
-def default_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
+FEWEST_PER_WAVE = 4
+"""Fewest nodes to the shortest wavelength: heights at the edges of cells half a wave long know nothing of it."""
+
+
+def fewest_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
+    """Fewest quadrature nodes, an even number as all are."""
+    return 2 * max(1, math.ceil(FEWEST_PER_WAVE * half_length * max([*shoe.turns, *wheel.turns], default=0.0)))
+
+
+def default_nodes(evaluator: str, half_length: float, shoe: Surface, wheel: Surface) -> int:
     """Quadrature nodes for the shortest wavelength of both surfaces, a multiple of `NODES`."""
     waves = 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0)
-    return NODES * max(1, math.ceil(NODES_PER_WAVE * waves / NODES - 1e-9))
+    return NODES * max(1, math.ceil(EVALUATORS[evaluator].nodes_per_wave * waves / NODES - 1e-9))
 
 
 class Pad(NamedTuple):
@@ -71,18 +79,16 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad.wheel_terms = wheel.g.size
     pad.signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
     top, bottom = _shoe_bounds(half_length, shoe)
-    pad.shoe_bound = max(top, bottom)
-    pad.wheel_bound = np.abs(wheel.g).sum()
-    pad.full_up_to = -pad.wheel_bound - top
-    pad.clear_from = pad.wheel_bound + bottom
-    pad.crest = pad.shoe_bound + pad.wheel_bound
     pad.steep, pad.curved = (np.abs(wheel.g) @ wheel.omega**n for n in (1, 2))
     cells = max(FEWEST_CELLS, CELLS_PER_WAVE * 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     pad.cell = 2.0 * half_length / cells
     pad.cells = min(math.ceil(cells), MOST_CELLS)
     waves = wheel.g.size
-    tiles = -(-(nodes + 2 * BESIDE) // TILE) if nodes else 0
-    pad.edges_at = nodes + 2 * BESIDE + 2 * TILE + 2 * (waves + 7)  # behind what the other evaluators keep
+    tiles = -(-(nodes // 2 + 1 + BESIDE) // TILE) if nodes else 0
+    pad.columns = TILE * tiles
+    pad.parts_at = (nodes + 1 + 2 * BESIDE + 7) // 8 * 8
+    pad.sines_at = pad.parts_at + 2 * pad.columns
+    pad.edges_at = pad.sines_at + 2 * (waves + 7)  # behind what the other evaluators keep
     shapes = {
         "waves_at": (tiles, waves, 2, TILE),  # first, for its tiles must be aligned
         "gap_at": (3 * (waves + shoe.g.size),),
@@ -91,8 +97,9 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         "ss_at": (waves, waves),
         "cc_at": (waves, waves),
         "pr_at": (2 * waves,),
-        "opposite_at": (-(-tiles // 2), 2, TILE),
-        "nodes_at": (nodes,),
+        "nodes_at": (nodes + 1 + 2 * BESIDE if nodes else 0,),
+        "rises_at": (nodes + 1 if nodes else 0,),
+        "nothing_at": (TILE,),
         "turns_at": (3 * waves,),
     }
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
@@ -113,10 +120,34 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     into = table["ss_at"], table["cc_at"]
     table["pr_at"][:], pad.shoe_mean, pad.shoe_square = _products(half_length, shoe, wheel, into)
     if nodes:
-        pad.rows = window_rows(wheel, 2.0 * half_length / nodes)
-        pad.rise_error = _node_tables(half_length, shoe, wheel, table["nodes_at"], table["waves_at"])
-        _opposite(table["nodes_at"], table["opposite_at"])
+        cell = 2.0 * half_length / nodes
+        pad.rows = window_rows(wheel, cell)
+        _edge_tables(cell, flattened(shoe, cell), flattened(wheel, cell), table["nodes_at"], table["waves_at"])
+        wheel = flattened(wheel, cell)
+        turns = np.sin(np.outer(np.arange(1.0, BESIDE + 1.0), wheel.omega * cell))
+        pad.rise_error = np.abs(wheel.g) @ np.abs(wheel.omega - 2.0 * np.array(RISE) @ turns / cell)
+        f1 = table["nodes_at"][BESIDE:-BESIDE]
+        for i, part in enumerate(RISE, 1):
+            ahead, behind = (table["nodes_at"][BESIDE + n :][: nodes + 1] for n in (i, -i))
+            table["rises_at"][:] += part * (ahead - behind)
+        top = max(top, float(f1.max()))
+        bottom = max(bottom, float(-f1.min()))
+    pad.shoe_bound = max(top, bottom)
+    pad.wheel_bound = np.abs(wheel.g).sum()
+    pad.full_up_to = -pad.wheel_bound - top
+    pad.clear_from = pad.wheel_bound + bottom
+    pad.crest = pad.shoe_bound + pad.wheel_bound
     return Pad(pad, flat)
+
+
+def flattened(surface: Surface, cell: float) -> Surface:
+    """The profile whose heights at both edges of a cell (m) have the mean of that over the cell, everywhere.
+
+    The mean of a sine is that in the middle times sin(z)/z with z = ωc/2, that of both edges cos(z) times it: the
+    amplitude becomes g tan(z)/z. So the force of a pad that touches everywhere is the closed form.
+    """
+    z = 0.5 * surface.omega * cell
+    return surface._replace(g=surface.g * np.tan(z) / z)
 
 
 def interpolation_error(wheel: Surface, spacing: float) -> float:
@@ -130,16 +161,17 @@ def interpolation_error(wheel: Surface, spacing: float) -> float:
 
 
 def window_rows(wheel: Surface, spacing: float) -> int:
-    """Points of a window's grid to a node of this spacing (m); 0 without window: few waves, or too short ones."""
+    """Points of a window's grid to a cell of this length (m); 0 without window: few waves, or too short ones."""
     if wheel.g.size <= MOST_SUMMED:
         return 0
     allowed = INTERPOLATED * float(np.abs(wheel.g).sum())
+    wheel = flattened(wheel, spacing)
     return next((rows for rows in ROWS if interpolation_error(wheel, spacing / rows) <= allowed), 0)
 
 
 def window_width(nodes: int) -> int:
-    """Nodes of a window, in whole tiles: three times as many as are needed at once."""
-    return 3 * TILE * (-(-(nodes + 2 * BESIDE + POINTS) // TILE) + 1)
+    """Edges of a window, in whole tiles: three times as many as are needed at once."""
+    return 3 * TILE * (-(-(nodes + 1 + 2 * BESIDE + POINTS) // TILE) + 1)
 
 
 class ContactLayer(NamedTuple):
@@ -216,39 +248,18 @@ def _pieces(rows: int, wide: int = 1) -> Iterator[slice]:
     return (slice(i, min(i + step, rows)) for i in range(0, rows, step))
 
 
-def _node_tables(a: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Floats) -> float:
-    """Cell means of f1, and of g sin(omega xi), g cos(omega xi) for the wheel, with cells beyond each end: by
-    tiles, waves, sine and cosine, and nodes. A bound of the error of f2' from the neighbouring nodes.
-
-    The mean of a sine over a cell is its value in the middle times sinc(omega spacing/2). With means instead of
-    values the midpoint sum of a fully touching pad is its integral, so `auto` may change over without a jump.
+def _edge_tables(cell: float, shoe: Surface, wheel: Surface, f1: Floats, waves: Floats) -> None:
+    """f1 at all edges, with edges beyond both ends, and g sin(omega xi), g cos(omega xi) of the wheel at those
+    from the middle on: by tiles, waves, sine and cosine, and edges.
     """
-    spacing = 2.0 * a / f1.size
-
-    def mean(f: Surface) -> Floats:
-        return f.g * np.sinc(f.omega * spacing / (2.0 * np.pi))
-
     for part in _pieces(f1.size):
-        xi = -a + spacing * (np.arange(part.start, part.stop) + 0.5)
-        for g, omega, phase in zip(mean(shoe), shoe.omega, shoe.phase, strict=True):
+        xi = cell * (np.arange(part.start, part.stop) - f1.size // 2)
+        for g, omega, phase in zip(shoe.g, shoe.omega, shoe.phase, strict=True):
             f1[part] += g * np.sin(omega * xi + phase)
     for part in _pieces(len(waves), TILE):
-        xi = -a + spacing * (np.arange(TILE * part.start, TILE * part.stop) + 0.5 - BESIDE)
-        for i, (g, omega) in enumerate(zip(mean(wheel), wheel.omega, strict=True)):
+        xi = cell * np.arange(TILE * part.start, TILE * part.stop)
+        for i, (g, omega) in enumerate(zip(wheel.g, wheel.omega, strict=True)):
             waves[part, i] = np.stack([g * f(omega * xi).reshape(-1, TILE) for f in (np.sin, np.cos)], 1)
-    turns = np.sin(np.outer([1.0, 2.0, 3.0], wheel.omega * spacing))
-    differences = np.array([45.0, -9.0, 1.0]) @ turns / (30.0 * spacing)  # what they make of omega
-    return float(np.abs(wheel.g) @ np.abs(wheel.omega - differences))
-
-
-def _opposite(f1: Floats, into: Floats) -> None:
-    """f1 by tiles as in `_node_tables` at the nodes of one half, and at those opposite; elsewhere no gap opens."""
-    half = f1.size // 2
-    for part in _pieces(len(into), TILE):
-        node = np.arange(TILE * part.start, TILE * part.stop) - BESIDE
-        for side, (place, count) in enumerate(((node, f1.size - half), (f1.size - 1 - node, half))):
-            inside = (node >= 0) & (node < count)
-            into[part, side] = np.where(inside, f1[np.where(inside, place, 0)], 1e300).reshape(-1, TILE)
 
 
 def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:

@@ -10,8 +10,8 @@ import math
 import numpy as np
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.contact import MIDPOINT
-from brakecli.solver.contact.midpoint import left_out
+from brakecli.solver.contact import CELLS
+from brakecli.solver.contact.cells import left_out
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion.forces import NEAR, act, cone
 from brakecli.solver.motion.phases import OPEN, STICK, side_of
@@ -122,7 +122,7 @@ def _rule(p: Plant) -> int:
 def grow(p: Plant, tables: Floats, scratch: Floats, h: float) -> None:
     """Carry error and disturbance along the step that has been made, and add what the step makes of its own.
 
-    At each place of Gauss's rule that is its share of u' - f(u), and of what the midpoint rule leaves out of F_y.
+    At each place of Gauss's rule that is its share of u' - f(u), and of what cells leave out of F_y.
     """
     c = p.c
     m = p.block
@@ -147,7 +147,7 @@ def grow(p: Plant, tables: Floats, scratch: Floats, h: float) -> None:
         for i in range(4):
             r.w[i], r.rates[i] = interpolated_both(r, i, theta)
         act(p, tables, scratch, _AT, theta * step, r.w)
-        missing = left_out(r.w[Y], p.layer, tables, scratch) / c.m if p.layer.contact.kind == MIDPOINT else 0.0
+        missing = left_out(r.w[Y], p.layer, scratch) / c.m if p.layer.contact.kind == CELLS else 0.0
         _ahead(p, before * step)
         for i in range(4):
             if m.phase != STICK or i in (Y, V_Y):

@@ -8,12 +8,11 @@ the step finds them.
 from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import CLOSED_FORM, EVALUATORS
-from brakecli.solver.contact.closed_form import FULL, clear, coverage, full_contact, full_press
+from brakecli.solver.contact.cells import press
+from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage, full_contact, full_press
 from brakecli.solver.contact.force import evaluate
-from brakecli.solver.contact.midpoint import press as press_nodes
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
-from brakecli.solver.motion.cells import press as press_cells
 from brakecli.solver.motion.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, held, side_of
 from brakecli.solver.motion.record import BELT, BELT_SLOPE, LOAD, LOAD_SLOPE, V_X, V_Y, X, Y
 from brakecli.solver.plant import Plant
@@ -21,7 +20,7 @@ from brakecli.solver.plant import Plant
 NEAR = 3.0
 """Times what the error moves a margin by: one that comes nearer to zero may be an event, or none."""
 
-_ON_NODES = list(EVALUATORS).index("midpoint")
+_CELLS = list(EVALUATORS).index("cells")
 
 
 @kernel
@@ -61,18 +60,14 @@ def touch(p: Plant, tables: Floats, scratch: Floats, place: float, y: float) -> 
     """
     pad = p.layer.pad
     contact = p.layer.contact
-    r = p.runge
-    if r.on_grid == 1:
-        press_cells(p.cells, tables, place, y, r.steeply == 1)
-        contact.normal_force = p.cells.force
-        contact.stiffness = p.cells.touching
-        contact.tangential = p.cells.slope
-        return
-    if p.block.phase == OPEN:
+    light = p.runge.light == 1
+    on_grid = p.runge.on_grid == 1
+    covered = coverage(y, pad)
+    if p.block.phase == OPEN or (on_grid and covered == CLEAR):
         clear(contact)
         return
     p.counts.evaluations += 1
-    if pad.shoe_terms + pad.wheel_terms == 0:
+    if pad.shoe_terms + pad.wheel_terms == 0 and not on_grid:
         contact.stiffness = 2.0 * pad.half_length * pad.k
         contact.normal_force = -contact.stiffness * y  # Eq. (2), continued: an event ends the phase at y = 0
         contact.fraction = 1.0 if y < 0.0 else 0.0
@@ -81,29 +76,17 @@ def touch(p: Plant, tables: Floats, scratch: Floats, place: float, y: float) -> 
         contact.kind = CLOSED_FORM
         contact.valid = 1
         contact.store = 0.5 * contact.stiffness * y * y
-        return
-    full = coverage(y, pad) == FULL
-    light = r.light == 1
-    if not full or p.layer.window.rows > 0:
-        if light and p.layer.evaluator == _ON_NODES:
-            press_nodes(place, y, p.layer, tables, scratch)
+    elif covered != FULL or p.layer.window.rows > 0:
+        if light and p.layer.evaluator == _CELLS:
+            press(place, y, p.layer, tables, scratch, p.runge.steeply == 1)
         else:
             evaluate(place, y, p.layer, tables, scratch)
-        if full:  # the sum over nodes is the closed form
+        if covered == FULL:  # the sum over cells is the closed form
             contact.kind = CLOSED_FORM
-    elif not light:
-        full_contact(place, y, p.layer, tables, scratch)
-    elif place == r.pressed_x:  # in stick; the force is linear in y
-        contact.stiffness = 2.0 * pad.half_length * pad.k
-        contact.fraction = 1.0
-        contact.normal_force = r.pressed - contact.stiffness * (y - r.pressed_y)
-        contact.kind = CLOSED_FORM
-        contact.valid = 1
-    else:
+    elif light:
         full_press(place, y, p.layer, tables, scratch)
-        r.pressed_x = place
-        r.pressed_y = y
-        r.pressed = contact.normal_force
+    else:
+        full_contact(place, y, p.layer, tables, scratch)
 
 
 @kernel(inline=False)

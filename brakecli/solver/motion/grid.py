@@ -12,9 +12,9 @@ columns carry the derivative of that time, so that they are the derivative of th
 import math
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.contact.cells import extreme_gap
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import columns, extent
-from brakecli.solver.motion.cells import extreme_gap
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.motion.events import DONE, INTERRUPTED, LOST, anchor, enter_phase, look, pass_event
 from brakecli.solver.motion.forces import act, find_again, find_margin_rates, find_margins, rate, resistance, touch
@@ -106,7 +106,7 @@ def _carry(p: Plant, h: float, j: int) -> None:
 
 
 @kernel(inline=False)
-def _carry_all(p: Plant, tables: Floats, h: float, to_kink: bool) -> None:
+def _carry_all(p: Plant, tables: Floats, scratch: Floats, h: float, to_kink: bool) -> None:
     """Move the columns along the step that has been made.
 
     The time of a kink depends on the state: at each column the gap stays zero. So does that of an event, but there
@@ -116,7 +116,7 @@ def _carry_all(p: Plant, tables: Floats, h: float, to_kink: bool) -> None:
     r = p.runge
     slope = 0.0
     if to_kink:
-        _, slope = _gap(p, tables, h, r.end, _everywhere(p))
+        _, slope = _gap(p, tables, scratch, h, r.end, _everywhere(p))
     opens = slope * (r.end[V_X] - m.z[BELT]) - r.end[V_Y]
     for j in range(m.count):
         r.longer[j] = 0.0 if to_kink else -r.late[j]
@@ -249,9 +249,15 @@ def _note(p: Plant, h: float) -> None:
 
 
 @kernel
+def _stiffness(p: Plant) -> float:
+    """2ak, N/m."""
+    return 2.0 * p.layer.pad.half_length * p.layer.pad.k  # type: ignore[no-any-return]
+
+
+@kernel
 def _note_contact(p: Plant, touching: float) -> None:
     r = p.runge
-    part = touching / p.cells.stiffness
+    part = touching / _stiffness(p)
     r.least_contact = min(r.least_contact, part)
     r.most_contact = max(r.most_contact, part)
 
@@ -262,7 +268,7 @@ def _touches(p: Plant, stage: int) -> int:
     touching = p.runge.touch[stage, 1]
     if touching == 0.0:
         return 0
-    return 2 if touching >= _FULL * p.cells.stiffness else 1
+    return 2 if touching >= _FULL * _stiffness(p) else 1
 
 
 @kernel
@@ -273,11 +279,13 @@ def _everywhere(p: Plant) -> bool:
 
 
 @kernel(inline=False)
-def _gap(p: Plant, tables: Floats, since: float, z: Floats, everywhere: bool) -> tuple[float, float]:
+def _gap(
+    p: Plant, tables: Floats, scratch: Floats, since: float, z: Floats, everywhere: bool
+) -> tuple[float, float]:
     """The gap of a state that is zero at a kink, and the slope of the wheel there."""
     m = p.block
     place = m.anchor if m.phase == STICK else z[X] - m.z[BELT] * (m.time + since)
-    return extreme_gap(p.cells, tables, place, z[Y], everywhere)
+    return extreme_gap(place, z[Y], everywhere, p.layer, tables, scratch)
 
 
 @kernel(inline=False)
@@ -290,10 +298,10 @@ def _kink(p: Plant, tables: Floats, scratch: Floats, h: float, high: float) -> f
     before = _touches(p, 0)
     everywhere = _everywhere(p)
     low = 0.0
-    above = _gap(p, tables, high * h, r.end, everywhere)[0]
+    above = _gap(p, tables, scratch, high * h, r.end, everywhere)[0]
     for i in range(4):
         r.w[i] = p.block.z[i]
-    below = _gap(p, tables, 0.0, r.w, everywhere)[0]
+    below = _gap(p, tables, scratch, 0.0, r.w, everywhere)[0]
     side = 0
     for _ in range(_SEEKS):
         if high - low <= 2.0 * _KINK:
@@ -301,7 +309,7 @@ def _kink(p: Plant, tables: Floats, scratch: Floats, h: float, high: float) -> f
         share = below / (below - above) if below * above < 0.0 else 0.5
         part = min(max(low + share * (high - low), low + _KINK), high - _KINK)
         _step(p, tables, scratch, part * h, False)
-        gap = _gap(p, tables, part * h, r.end, everywhere)[0]
+        gap = _gap(p, tables, scratch, part * h, r.end, everywhere)[0]
         if _touches(p, END_STAGE) != before:
             high = part
             above = gap
@@ -353,7 +361,7 @@ def _take(p: Plant, tables: Floats, scratch: Floats, left: float) -> None:
         h = part * h
         _step(p, tables, scratch, h, steeply)
     _note(p, h)
-    _carry_all(p, tables, h, smooth < 1.0)
+    _carry_all(p, tables, scratch, h, smooth < 1.0)
     for i in range(4):
         m.z[i] = r.end[i]
     m.time += h
@@ -388,7 +396,7 @@ def _begin(p: Plant, tables: Floats, scratch: Floats) -> None:
     r = p.runge
     m.time = 0.0
     m.events = 0
-    p.cells.place = math.nan
+    p.layer.known = 0
     r.open = 0.0
     for j in range(m.count):
         r.late[j] = 0.0
@@ -435,7 +443,7 @@ def fly_on_grid(p: Plant, tables: Floats, scratch: Floats, span: float) -> int:
                 return ends
             _look(p)
         m.time = until
-        if n & _SIGNALS == _SIGNALS and stopped(p.cells.signals):
+        if n & _SIGNALS == _SIGNALS and stopped(p.layer.pad.signals):
             return INTERRUPTED
     _note_border(p)
     rate(p, m.phase, m.z, 0.0, m.velocity)

@@ -151,15 +151,14 @@ RUNGE = record(
     "length",  # of the step that the continuous solution belongs to, s
     "base time",  # when that began, as in the block, s
     "lowest",  # what the margin of slip or stick falls to in the last step, and rises again
-    "pressed_x pressed_y pressed",  # where full contact has been computed in this step, and its force, N
     "grid",  # step of the grid, s
     "least_slide least_hold least_pass",  # see `rough.Margins`
     "least_contact most_contact",  # part of the pad that touches
     "open",  # time in which nothing touches, s
+    steeply=int,  # 1 where the contact's derivative by x is asked for
     on_grid=int,  # 1 where steps lie on a grid, 0 where they keep a tolerance
     pair=int,  # 0: steps of order eight, 1: of order five
     light=int,  # 1 where the contact finds the force alone
-    steeply=int,  # 1 where the contact's derivative by x is asked for
     level=int,  # number of the sample interval that has been reached
     switches=int,  # changes of phase without a step in between
     steps=int,  # of the grid

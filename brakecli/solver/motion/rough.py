@@ -3,35 +3,28 @@
 The number of steps does not depend on the state, so the end is a smooth function of the state, of the span and of
 the parameters, as long as the sequence of phases is the same.
 
-The pad is cut into cells of equal length, and the gap f2 - f1 - y is a straight line in each of
-them. The force (2), its derivatives by x and y and the length that touches are then closed forms, and the force is
-continuously differentiable. The heights at the nodes are those of the surfaces times tan(ωc/2) / (ωc/2) for a cell
-of length c. With this factor the force of a pad that touches everywhere is exact. In partial contact the cells in
-which contact begins or ends have an error of order c³, which cancels on average as the edge passes through a
-cell. The end of a flow has an error of order c⁴. A wave is even or odd about the middle of the pad, so tables of
-one half are enough.
+The contact is that of cells (`contact.cells`), whose force is continuously differentiable. Cells of length c in
+which contact begins or ends have an error of order c³, which cancels on average as the edge passes through a cell.
+The end of a flow has an error of order c⁴.
 """
 
 import math
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any
 
 import numpy as np
 
-from brakecli import stop
 from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import fastest_decay
-from brakecli.solver.contact.pad import aligned
+from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.double_double import two_product
 from brakecli.solver.motion import events as ends
-from brakecli.solver.motion.cells import EIGHT, FOUR
 from brakecli.solver.motion.phases import STICK
 from brakecli.solver.motion.record import BELT, LOAD
 from brakecli.solver.motion.tasks import FLY, step
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
-from brakecli.solver.roughness import Surface, wheel_angles
+from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.system import System
 
 CELLS_PER_WAVE = 24
@@ -40,6 +33,8 @@ STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passe
 
 STABLE = 2.5
 """Largest decay in a step, in powers of e: beyond 3.3 DOPRI5 multiplies what decays."""
+
+_NO_ROWS = np.zeros((1, 1))
 
 
 class Status(IntEnum):
@@ -115,24 +110,28 @@ class RoughFlow:
     def __init__(self, system: System, cells: int = 0) -> None:
         """Make the tables of so many cells, an even number; 0 takes `default_cells`.
 
-        Raises ValueError where speed or load change, or where a cell is longer than half a wave.
+        Raises ValueError where speed or load change, or where cells do not tell the shortest wave.
         """
         if not system.steady:
             raise ValueError("the flow needs a constant speed and a constant load")
-        cells = cells or default_cells(system)
-        cells += cells % 2
-        cell = 2.0 * system.half_length / cells
-        if not cell * system.most_turns < 0.5:
-            raise ValueError(f"{cells} cells are too few: two and more to each wave are needed")
+        on_cells = system.by(evaluator="cells", nodes=cells or default_cells(system))
+        if cells and on_cells.nodes > cells + 1:
+            raise ValueError(f"{cells} cells are too few: {on_cells.nodes} are needed")
         self.system = system
-        self.cells = cells
-        self._plants, self._tables = _prepared(system, cells)
-        self._plant = self._plants[0]
-        n = system.wheel.g.size
-        at = int(self._plant.cells.angles_at)
+        self.cells = on_cells.nodes
+        self._plants = one(PLANT)
+        self._layer = build_layer("cells", on_cells.pad)
         self._belt = system.belt_speed
         self._waves = system.wheel.waves
-        self._angles = self._tables[at : at + n]
+        self._angles = self._layer.angles
+        plant = self._plant = self._plants[0]
+        plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
+        plant.layer = self._layer.layer
+        plant.runge.on_grid = 1
+        plant.runge.pair = 1
+        plant.runge.light = 1
+        plant.block.z[BELT] = system.belt_speed
+        plant.block.z[LOAD] = system.load_at_start
 
     def __call__(self, state: Floats, begin_time: float, span: float, steps: int, tangents: bool = True) -> Flown:
         """The flow from a state (x, y, v_x, v_y) at a time (s), over a span (s) in so many equal steps."""
@@ -145,7 +144,7 @@ class RoughFlow:
         m.count = 4 if tangents else 0
         m.seconds = span
         r.steps = steps
-        status = Status(step(self._plants, self._tables, _NO_SCRATCH, _NO_ROWS, _NO_ROWS, 0))
+        status = Status(step(self._plants, self._layer.tables, self._layer.scratch, _NO_ROWS, _NO_ROWS, 0))
         events = int(m.events)
         return Flown(
             status,
@@ -166,78 +165,3 @@ class RoughFlow:
                 stick_share=float(m.spent[STICK]) / span,
             ),
         )
-
-
-_NO_SCRATCH = np.zeros(1)
-_NO_ROWS = np.zeros((1, 1))
-
-
-def _flattened(surface: Surface, cell: float) -> Floats:
-    """Amplitudes of a gap that is straight in each cell: its force in full contact is that of the sines."""
-    half = 0.5 * surface.omega * cell
-    found: Floats = surface.g * np.tan(half) / half
-    return found
-
-
-def _prepared(system: System, cells: int) -> tuple[Any, Floats]:
-    """An array of the record of a motion, and the tables of its pad."""
-    plants = one(PLANT)
-    plant = plants[0]
-    f = plant.cells
-    wheel = system.wheel
-    shoe = system.shoe
-    a = system.half_length
-    half = cells // 2
-    waves = wheel.g.size
-    cell = 2.0 * a / cells
-    width = -(-(half + 1) // FOUR) * FOUR
-    eights = -(-waves // EIGHT) * EIGHT
-    shapes = {
-        "waves_at": (waves, 2, width),  # first, for its rows must be aligned
-        "nodes_at": (4, width),
-        "shoe_at": (2, width),
-        "sines_at": (4, eights),
-        "omega_at": (waves,),
-        "g_at": (waves,),
-        "full_at": (waves,),
-        "angles_at": (waves,),
-    }
-    tables = aligned(sum(map(math.prod, shapes.values())))
-    table = dict[str, Floats]()
-    place = 0
-    for name, shape in shapes.items():
-        f[name] = place
-        size = math.prod(shape)
-        table[name] = tables[place : place + size].reshape(shape)
-        place += size
-    xi = cell * np.arange(width)
-    g = _flattened(wheel, cell)
-    heights = table["shoe_at"]
-    for amplitude, omega, phase in zip(_flattened(shoe, cell), shoe.omega, shoe.phase, strict=True):
-        heights += amplitude * np.sin(omega * np.array([xi, -xi]) + phase)
-    table["omega_at"][:] = wheel.omega
-    table["g_at"][:] = g
-    angle = np.outer(wheel.omega, xi)
-    table["waves_at"][:, 0] = np.sin(angle)
-    table["waves_at"][:, 1] = np.cos(angle)
-    steeper = np.divide(wheel.g, g, out=np.ones_like(g), where=g != 0.0)
-    table["full_at"][:] = system.contact_stiffness * np.sinc(wheel.omega * a / np.pi) * steeper
-    f["stiffness"] = system.contact_stiffness
-    plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
-    plant.runge.on_grid = 1
-    plant.runge.pair = 1
-    plant.layer.pad.half_length = a
-    plant.layer.pad.k = system.layer_stiffness
-    plant.block.z[BELT] = system.belt_speed
-    plant.block.z[LOAD] = system.load_at_start
-    f["half"] = 0.5 * system.layer_stiffness * cell
-    f["half_cells"] = half
-    f["width"] = width
-    f["waves"] = waves
-    f["shoe_mean"] = float(np.sum(shoe.g * np.sin(shoe.phase) * np.sinc(shoe.omega * a / np.pi)))
-    crest = float(np.abs(g).sum())
-    nodes = heights[:, : half + 1]
-    f["full_up_to"] = -crest - nodes.max()
-    f["clear_from"] = crest - nodes.min()
-    f["signals"] = np.frombuffer(stop.memory, np.uint8).ctypes.data
-    return plants, tables

@@ -101,7 +101,6 @@ def _arrive(p: Plant, tables: Floats, scratch: Floats) -> None:
     travel, travel_low = integral_at(scratch[p.drive.belt_at : p.drive.belt_end], m.base, m.time)
     if p.layer.pad.wheel_terms > 0:
         turn(travel, travel_low, p.layer, tables, scratch)
-    p.runge.pressed_x = math.nan
     if m.phase == STICK:
         m.z[X] = carried(m.anchor, m.anchor_low, travel, travel_low)
         m.z[V_X] = m.z[BELT]
