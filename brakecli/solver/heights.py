@@ -284,11 +284,13 @@ def gaps(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
 
 @kernel(fastmath=FAST)
 def _find_rises(gap: Floats, rises_of_f1: Floats, found: Floats) -> None:
-    """f2' times a cell at the edges, by a polynomial through four neighbours on each side."""
+    """f2' times a cell at the edges, by a polynomial through eight neighbours on each side."""
     for j in range(found.size):
-        one = RISE[0] * (gap[j + 5] - gap[j + 3]) + RISE[1] * (gap[j + 6] - gap[j + 2])
-        two = RISE[2] * (gap[j + 7] - gap[j + 1]) + RISE[3] * (gap[j + 8] - gap[j])
-        found[j] = one + two + rises_of_f1[j]
+        one = RISE[0] * (gap[j + 9] - gap[j + 7]) + RISE[1] * (gap[j + 10] - gap[j + 6])
+        two = RISE[2] * (gap[j + 11] - gap[j + 5]) + RISE[3] * (gap[j + 12] - gap[j + 4])
+        three = RISE[4] * (gap[j + 13] - gap[j + 3]) + RISE[5] * (gap[j + 14] - gap[j + 2])
+        four = RISE[6] * (gap[j + 15] - gap[j + 1]) + RISE[7] * (gap[j + 16] - gap[j])
+        found[j] = one + two + (three + four) + rises_of_f1[j]
 
 
 @kernel

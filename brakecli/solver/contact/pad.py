@@ -18,9 +18,16 @@ from brakecli.solver.roughness import Surface, height
 
 TILE = 72
 """Edges of cells in a piece of the tables of the wheel."""
-RISE: tuple[float, ...] = 4.0 / 5.0, -1.0 / 5.0, 4.0 / 105.0, -1.0 / 280.0
-BESIDE = len(RISE)
-"""What differences of heights at the edges to both sides make of a slope, and edges beyond each end of the pad."""
+BESIDE = 8
+"""Edges of cells beyond each end of the pad."""
+RISE: tuple[float, ...] = tuple(
+    -((-1.0) ** i) / i * math.comb(2 * BESIDE, BESIDE - i) / math.comb(2 * BESIDE, BESIDE)
+    for i in range(1, BESIDE + 1)
+)
+"""What differences of heights at the edges to both sides make of a slope, by a polynomial through all of them.
+
+With z = ωc it misses that of a sine by z^16 (8!)²/17!: 2e-15 of it with 24 cells to a wave, and 1e-7 with 8.
+"""
 
 MOST_SUMMED = 10
 """Waves of the wheel up to which their sums at all edges are as fast as a window."""

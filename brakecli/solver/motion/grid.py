@@ -52,8 +52,6 @@ _ABOVE = 0.75  # of a part at which a margin is negative, the middle of a bracke
 _CERTAIN = 0.01
 _NARROWEST = 1e-16
 _WHOLE = 1e-12  # part of a step by which a stop may lie before or behind its end
-_SIGNALS = 1023
-"""Steps of the grid between two looks at signals, plus one a power of two."""
 
 
 @kernel
@@ -443,7 +441,7 @@ def fly_on_grid(p: Plant, tables: Floats, scratch: Floats, span: float) -> int:
                 return ends
             _look(p)
         m.time = until
-        if n & _SIGNALS == _SIGNALS and stopped(p.layer.pad.signals):
+        if stopped(p.layer.pad.signals):
             return INTERRUPTED
     _note_border(p)
     rate(p, m.phase, m.z, 0.0, m.velocity)

@@ -5,7 +5,7 @@ import math
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import ROUNDING
-from brakecli.solver.kernels import kernel
+from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import tableaus
 from brakecli.solver.motion.forces import act, find_margin_rates, find_margins, rounding
 from brakecli.solver.motion.phases import STICK
@@ -32,6 +32,8 @@ def advance_stages(p: Plant, tables: Floats, scratch: Floats, h: float, first: i
     m = p.block
     r = p.runge
     for stage in range(first, end):
+        if stopped(p.layer.pad.signals):  # an evaluation may take as long as a run
+            return
         tableaus.combine(r, m.z, h, stage)
         act(p, tables, scratch, stage, NODES[r.pair, stage] * h, r.w)
     if first == END_STAGE:

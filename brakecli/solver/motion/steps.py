@@ -8,7 +8,7 @@ import math
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.double_double import EPSILON
-from brakecli.solver.kernels import kernel
+from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import errors
 from brakecli.solver.motion.crossing import crossing
 from brakecli.solver.motion.events import STALLED, anchor, enter_phase, note_phase, pass_event, pass_knot
@@ -265,6 +265,8 @@ def step(p: Plant, tables: Floats, scratch: Floats) -> int:
     h = min(r.step, limit)
     growth = _MOST
     while True:
+        if stopped(p.layer.pad.signals):  # stages are empty then, and no step keeps the tolerance
+            return _STALLED
         if h < limit:
             last = False
         error = attempt(p, tables, scratch, h, 1.0)
