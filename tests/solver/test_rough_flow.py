@@ -91,7 +91,8 @@ def test_the_derivative_is_that_of_differences(many: int) -> None:
         system, state, span, rng = rough_shoe(seed)
         if stuck := rng.random() < 0.3:
             state[2] = system.belt_speed
-        flow = RoughFlow(system, int(rng.choice([60, 96, 130])))
+        cells = system.by(evaluator="cells", nodes=int(rng.choice([60, 96, 130]))).nodes
+        flow = RoughFlow(system, cells)
         size = scales(system)
         steps = default_steps(system, span)
         begin = float(rng.uniform(0.0, 1.0))
