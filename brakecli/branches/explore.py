@@ -10,15 +10,16 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.stability.modes import is_undamped
+from brakecli.analysis.stability.search import bisect
 from brakecli.branches.begin import settled
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.follow import Stop, both_ways, follow
 from brakecli.branches.forced import MOST_PERIODS, Forced
 from brakecli.branches.islands import PARTS, Search, places, tried
 from brakecli.branches.line import Line
-from brakecli.branches.newton import Newton, Settings
-from brakecli.branches.point import Point
-from brakecli.branches.problem import Problem
+from brakecli.branches.newton import LEFT, OFF, Newton, Settings
+from brakecli.branches.point import Point, cubic
+from brakecli.branches.problem import Array, Problem
 from brakecli.branches.rough_cycles import RoughCycles
 from brakecli.branches.sliding import Change, Slide, Sliding
 from brakecli.branches.switch import switch
@@ -45,6 +46,9 @@ GROWING_POINTS = 300
 """Budget of points in which the waves grow to their size; a choice."""
 GROWN_AT: tuple[float, ...] = 0.0, 1.0, 0.5, 0.25, 0.75
 """Places of the line at which a forced motion is sought that grows with the waves, where none is known yet."""
+NEAR = 1e-6
+NOTHING = 1e-12
+"""Parts of the way between two points to which a place between them is guessed, and found; choices."""
 SAME = 1e-6
 """Relative difference of amplitude and period by which two motions at one value are the same."""
 LARGE = "its amplitude is ten thousand times that of its begin"
@@ -157,6 +161,9 @@ class Explorer:
         how = self._settings(), self._until(problem, first), self.stop
         branch = both_ways(problem, first, *how) if within else follow(problem, first, None, *how)
         self.branches.append(replace(told_of(self.line, branch, problem, kind, change, changes), note=note))
+        for other in branch.aside:
+            if not (self._over() or any(passes(followed, other) for followed in self.branches)):
+                self._follow(problem, other, kind, note, within=True)
 
     def _settings(self) -> Settings:
         left = max(self.end - perf_counter(), 0.0)
@@ -339,6 +346,35 @@ def meets(one: Followed, other: Followed) -> bool:
     return any(lies_on(other, point) for point in points[:: max(len(points) // MEETS, 1)])
 
 
+def passes(followed: Followed, motion: Point) -> bool:
+    """Whether a branch passes through a motion: there, in the plane across its chord that holds the motion."""
+    points = followed.branch.points if followed.branch is not None else []
+    newton = Newton(followed.problem, Settings())
+    for one, other in pairwise(points):
+        if one.chart is not motion.chart or other.chart is not motion.chart:
+            continue
+        chord = other.z - one.z
+        length = math.sqrt(chord @ chord)
+        ahead = chord @ (motion.z - one.z)
+        behind = chord @ (other.z - motion.z)
+        if ahead < 0.0 or behind < 0.0 or length == 0.0:
+            continue
+        part = _across(one, other, motion, chord)
+        if np.linalg.norm(cubic(one, other, part) - motion.z) > LEFT * length + OFF:
+            continue
+        followed.problem.use(one.chart)
+        point = newton.between(one, other, part)
+        if point is not None and np.linalg.norm(point.z - motion.z) < SAME:
+            return True
+    return False
+
+
+def _across(one: Point, other: Point, motion: Point, chord: Array) -> float:
+    """The part of the way between two neighbours at which their cubic is level with a motion."""
+    part, _ = bisect(lambda t: bool(chord @ (cubic(one, other, t) - motion.z) < 0.0), 0.0, 1.0, width=NOTHING)
+    return part
+
+
 def crossing(followed: Followed, p: float) -> list[Point]:
     """The motions of a branch at a place of the line."""
     found: list[Point] = []
@@ -351,8 +387,14 @@ def crossing(followed: Followed, p: float) -> list[Point]:
         if one.chart is not other.chart or not (one.p - p) * (other.p - p) <= 0.0 or one.p == other.p:
             continue
         followed.problem.use(one.chart)
-        part = (p - one.p) / (other.p - one.p)
-        point = newton.at_parameter(one.z + part * (other.z - one.z), p, other.z - one.z, one.s, exact=True)
+        guess = _near(one, other, p)
+        point = newton.at_parameter(guess, p, other.z - one.z, one.s, exact=True)
         if point is not None:
             found.append(point)
     return found
+
+
+def _near(one: Point, other: Point, p: float) -> Array:
+    """About where a branch passes a place of the line between two neighbours, by the cubic through them."""
+    part, _ = bisect(lambda t: bool(cubic(one, other, t)[-1] < p) is (one.p < p), 0.0, 1.0, width=NEAR)
+    return cubic(one, other, part)

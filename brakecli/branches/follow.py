@@ -101,7 +101,8 @@ def _finished(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Bra
             error = 0.0 if end.kind in ("range", "closed", "stopped") else walk.settings.shortest
             specials.append(Special("end", point.p, error, point, point.s, end.reason))
     specials.sort(key=lambda special: special.s)
-    return Branch(points, specials, ended, walk.newton.evaluations, unsearched)
+    aside = [new for _, new in walk.aside]
+    return Branch(points, specials, ended, walk.newton.evaluations, unsearched, aside)
 
 
 class _Walk:
@@ -115,6 +116,7 @@ class _Walk:
         self.newton = Newton(problem, settings)
         self.deadline = perf_counter() + settings.seconds
         self.count = 0
+        self.aside: list[tuple[Point, Point]] = []
 
     def over(self) -> End | None:
         """Why nothing more may be computed, if so."""
@@ -287,6 +289,11 @@ class _Walk:
         )
         ratio = max(angle, change / settings.change, STRIDES.straightest)
         if here.word == new.word:
+            if here.orientation[0] * new.orientation[0] < 0.0 and stride > settings.border:
+                # it crosses a branch point, or has jumped to another sheet where two of them nearly meet
+                if not self.aside or self.aside[-1][0] is not here:
+                    self.aside.append((here, new))
+                return STRIDES.shortest * stride, 0.0
             long = stride > STRIDES.fine * settings.shortest
             repeated = STRIDES.repeated
             if ratio > repeated and (long or angle > repeated):

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brakecli.branches.multipliers import spectrum
-from brakecli.branches.point import Point
+from brakecli.branches.point import Point, cubic
 from brakecli.branches.problem import Array, Problem, Seen
 
 ROUNDING = 1e-9
@@ -235,18 +235,11 @@ class Newton:
         length = math.sqrt(chord @ chord)
         if length == 0.0:
             return None
-        t = part
-        way = other.s - one.s
-        if one.word == other.word:
-            onward = one.tangent + other.tangent
-            guess = one.z + (3.0 * t**2 - 2.0 * t**3) * chord
-            guess += (t * (1.0 - t) * way) * ((1.0 - t) * one.tangent - t * other.tangent)
-        else:
-            onward = chord
-            guess = one.z + t * chord
+        guess = cubic(one, other, part)
+        onward = one.tangent + other.tangent if one.word == other.word else chord
         # the direction of a very short chord is mostly rounding
         normal = chord / length if length > SHORT else one.tangent
-        found = self.solved(guess, normal, onward, one.s + t * way, exact=True)
+        found = self.solved(guess, normal, onward, one.s + part * (other.s - one.s), exact=True)
         if found is not None:
             off = found.z - guess
             if off @ off > (LEFT * length) ** 2 + OFF**2:

@@ -1,8 +1,10 @@
 """A point of a branch, and a branch."""
 
 from collections.abc import Hashable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from brakecli.branches.multipliers import Complex
 from brakecli.branches.problem import Array
@@ -57,6 +59,15 @@ class Point:
         )
 
 
+def cubic(one: Point, other: Point, t: float) -> Array:
+    """The place at a part of the way between two neighbours, by their tangents; on the chord across a border."""
+    chord = other.z - one.z
+    if one.word != other.word:
+        return np.asarray(one.z + t * chord)
+    bend = (1.0 - t) * one.tangent - t * other.tangent
+    return np.asarray(one.z + (3.0 * t**2 - 2.0 * t**3) * chord + (t * (1.0 - t) * (other.s - one.s)) * bend)
+
+
 class End(NamedTuple):
     """Why a branch ends."""
 
@@ -97,3 +108,5 @@ class Branch:
     evaluations: int
     unsearched: str = ""
     """Why the search for special points is incomplete; empty where it is complete."""
+    aside: list[Point] = field(default_factory=list)
+    """Points beyond a change of orientation, by a long stride: of this branch, or of one that nearly meets it."""

@@ -1,12 +1,16 @@
 """Special points of branches against closed forms."""
 
 import math
+from itertools import pairwise
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
+from brakecli.branches.explore import passes
 from brakecli.branches.follow import both_ways, follow
-from brakecli.branches.newton import Settings, start
+from brakecli.branches.newton import Newton, Settings, start
 from brakecli.branches.point import Branch, Special
 from brakecli.branches.switch import switch
 from tests.branches.problems import Given, Orbits, Roots, delayed_logistic, henon, logistic
@@ -74,6 +78,32 @@ def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
     assert kinds(outer) == ["branch point", "end"]
     assert outer.specials[0].p == pytest.approx(0.4, abs=1e-6)
     assert outer.points[-1].u[0] == pytest.approx(-math.sqrt(0.6), abs=1e-9)
+
+
+@pytest.mark.parametrize("gap", [1e-9, -1e-8, 1e-7, -1e-6, 1e-5, 1e-3])
+def test_a_branch_does_not_jump_to_a_sheet_that_it_nearly_meets(gap: float) -> None:
+    """The pitchfork with a gap is no branch point: u (p - 0.4 - u²) + gap = 0 leads to the root on its side.
+
+    Where a stride had come to the other sheet, the motion there is told.
+    """
+    problem = Roots(
+        lambda u, p: [u[0] * (p - 0.4 - u[0] ** 2) + gap],
+        lambda u, p: [[p - 0.4 - 3.0 * u[0] ** 2]],
+        lambda u, p: [u[0]],
+    )
+    branch = follow(problem, first_of(problem, [0.0], 0.1))
+    assert kinds(branch) == ["end"]
+    largest = max(np.roots([1.0, 0.0, -0.6, -abs(gap)]).real)
+    assert branch.points[-1].u[0] == pytest.approx(math.copysign(largest, gap), abs=1e-9)
+    assert (abs(gap) < 1e-4) is bool(branch.aside)
+    followed: Any = SimpleNamespace(branch=branch, problem=problem)
+    for other in branch.aside:
+        assert other.u[0] * gap < 0.0
+        assert not passes(followed, other)
+    for one, other in pairwise(branch.points):
+        between = Newton(problem, Settings()).between(one, other, 0.3)
+        assert between is not None
+        assert passes(followed, between)
 
 
 def test_the_logistic_map_doubles_at_3_and_at_1_plus_the_root_of_6() -> None:
