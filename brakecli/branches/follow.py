@@ -44,6 +44,8 @@ class Strides:
 STRIDES = Strides()
 SAME_P = 1e-6
 """Change of p by a new chart, beyond which another motion was found."""
+MEET = 1e-3
+"""Part of the range: between two sheets a gap that is far narrower is none, and a branch point lies there."""
 VERTICAL = 1e-9
 """Slope dp/ds below which a tangent is vertical."""
 
@@ -289,8 +291,8 @@ class _Walk:
         )
         ratio = max(angle, change / settings.change, STRIDES.straightest)
         if here.word == new.word:
-            if here.orientation[0] * new.orientation[0] < 0.0 and stride > settings.border:
-                # it crosses a branch point, or has jumped to another sheet where two of them nearly meet
+            if here.orientation[0] * new.orientation[0] < 0.0 and abs(new.p - here.p) > MEET:
+                # A branch point lies in between, or a gap to another sheet: one that is narrower counts as none.
                 if not self.aside or self.aside[-1][0] is not here:
                     self.aside.append((here, new))
                 return STRIDES.shortest * stride, 0.0

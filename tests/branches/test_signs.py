@@ -80,17 +80,19 @@ def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
     assert outer.points[-1].u[0] == pytest.approx(-math.sqrt(0.6), abs=1e-9)
 
 
-@pytest.mark.parametrize("gap", [1e-9, -1e-8, 1e-7, -1e-6, 1e-5, 1e-3])
-def test_a_branch_does_not_jump_to_a_sheet_that_it_nearly_meets(gap: float) -> None:
-    """The pitchfork with a gap is no branch point: u (p - 0.4 - u²) + gap = 0 leads to the root on its side.
-
-    Where a stride had come to the other sheet, the motion there is told.
-    """
-    problem = Roots(
+def nearly_met(gap: float) -> Roots:
+    """A pitchfork with a gap: u (p - 0.4 - u²) + gap = 0; one sheet folds at p = 0.4 + 3 (gap/2)^(2/3)."""
+    return Roots(
         lambda u, p: [u[0] * (p - 0.4 - u[0] ** 2) + gap],
         lambda u, p: [[p - 0.4 - 3.0 * u[0] ** 2]],
         lambda u, p: [u[0]],
     )
+
+
+@pytest.mark.parametrize("gap", [1e-5, -1e-5, 1e-4, 1e-3])
+def test_a_branch_does_not_jump_to_a_sheet_that_it_nearly_meets(gap: float) -> None:
+    """It leads to the root on its side. Where a stride had come to the other sheet, the motion there is told."""
+    problem = nearly_met(gap)
     branch = follow(problem, first_of(problem, [0.0], 0.1))
     assert kinds(branch) == ["end"]
     largest = max(np.roots([1.0, 0.0, -0.6, -abs(gap)]).real)
@@ -104,6 +106,18 @@ def test_a_branch_does_not_jump_to_a_sheet_that_it_nearly_meets(gap: float) -> N
         between = Newton(problem, Settings()).between(one, other, 0.3)
         assert between is not None
         assert passes(followed, between)
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-12, -1e-10, 1e-9])
+def test_a_gap_that_is_narrower_than_any_range_shows_is_a_branch_point(gap: float) -> None:
+    """Up to 1e-9 it is 2e-6 of the range: the straight sheet loses its stability there, within the error told."""
+    problem = nearly_met(gap)
+    branch = follow(problem, first_of(problem, [0.0], 0.1))
+    assert kinds(branch) == ["branch point", "end"]
+    gap_in_p = 3.0 * (abs(gap) / 2.0) ** (2.0 / 3.0)
+    assert abs(branch.specials[0].p - 0.4) <= branch.specials[0].error + gap_in_p
+    assert branch.points[-1].u[0] == pytest.approx(0.0, abs=1e-8)
+    assert not branch.points[-1].stable
 
 
 def test_the_logistic_map_doubles_at_3_and_at_1_plus_the_root_of_6() -> None:

@@ -147,12 +147,15 @@ def test_a_window_of_a_twelve_thousandth_of_the_range_is_that_of_another_integra
     critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper)
     answers = Answers(explored(critical, make(tables, **{key: lower})).explored, None)
     for value, unstable in ((0.0177, False), (0.018, True), (0.0183, False)):
-        [point] = crossing(answers.bases[0], answers.line.place(value))
         wheel = Wheel(at(tables, key, value))
-        closed = wheel.closed(np.array(point.facts.state))
-        assert closed is not None
-        rate = math.log(float(np.abs(np.linalg.eigvals(closed[1])).max())) / wheel.period - wheel.level
-        assert (rate > 0.0) is unstable
+        rates = list[float]()
+        for point in crossing(answers.bases[0], answers.line.place(value)):  # on each of its sheets
+            closed = wheel.closed(np.array(point.facts.state))
+            assert closed is not None
+            largest = float(np.abs(np.linalg.eigvals(closed[1])).max())
+            rates.append(math.log(largest) / wheel.period - wheel.level)
+        assert rates
+        assert (min(rates) > 0.0) is unstable
 
 
 @campaign
