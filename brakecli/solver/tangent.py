@@ -16,8 +16,6 @@ from brakecli.solver.records import PARTS
 
 BATCHES = 8
 """Batches of the parts of the second half of a run; of twice as many parts each, half as many."""
-ALIKE = 4
-"""Sizes of a group that may leave the line of `even` together: an eighth of a run."""
 FEWEST_SAMPLES = 64
 """Fewest samples of a run with an exponent: its growth is noted at them."""
 LEAST = 1e-280
@@ -56,27 +54,41 @@ def _error_of_mean(rates: Floats) -> Floats:
     return found
 
 
+def _line(sizes: Floats, apart: float) -> tuple[Floats, Floats]:
+    """The slopes of lines through logarithms of sizes so far apart (s), and their standard errors (1/s).
+
+    What leaves the line at one place does so at the next: of correlation r from one to the next, n sizes tell as
+    much as n (1 - r)/(1 + r) that know nothing of each other (Santer et al. 2008, doi 10.1002/joc.1756, eqs. 4-6).
+    What is left beside a line shows too small an r, by (2 + 4 r)/n in the mean. Two of them a line goes through;
+    one more is taken for granted.
+    """
+    count = len(sizes)
+    places = (np.arange(count) - 0.5 * (count - 1)) * apart
+    squares = places @ places
+    slopes = places @ sizes / squares
+    rest = sizes - sizes.mean(axis=0) - np.outer(places, slopes)
+    left = (rest**2).sum(axis=0)
+    shown = (rest[1:] * rest[:-1]).sum(axis=0) / np.maximum(left, LEAST)
+    alike = np.clip(shown + (2.0 + 4.0 * shown) / count, 0.0, 1.0)
+    independent = count * (1.0 - alike) / (1.0 + alike)
+    errors = np.sqrt(left / np.maximum(independent - 2.0, 1.0) / squares)
+    return slopes, errors
+
+
 def exponents(logs: Floats, duration: float) -> list[Exponent]:
     """The exponents in the second half of runs, with their standard errors.
 
     Within a cycle a disturbance swings: its size is a mean over a batch. What wanders slowly is alike in
     neighbouring batches, which tell too little of it: the error is the larger of those by all batches and by half
     as many. `logs`: ln of the growth in each part, in the columns of runs. `even` is by the whole of a run but its
-    first eighth; its error is the larger of those by sizes that know nothing of each other, and that are alike in
-    groups.
+    first eighth.
     """
     sizes = np.cumsum(logs, axis=0).reshape(4 * BATCHES, -1, logs.shape[1]).mean(axis=1)
     late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
     rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
     longer = np.diff(late.reshape(BATCHES // 2, 2, -1).mean(axis=1), axis=0) * (BATCHES / duration)
     errors = np.maximum(_error_of_mean(rates), _error_of_mean(longer))
-    lined = sizes[len(sizes) // 8 :]
-    places = (np.arange(len(lined)) - 0.5 * (len(lined) - 1)) * (duration / len(sizes))
-    slopes = places @ lined / (places @ places)
-    rest = lined - lined.mean(axis=0) - np.outer(places, slopes)
-    apart = (rest**2).sum(axis=0) * (places @ places) / (len(lined) - 2)
-    alike = ((places[:, None] * rest).reshape(-1, ALIKE, rest.shape[1]).sum(axis=1) ** 2).sum(axis=0)
-    off = np.sqrt(np.maximum(apart, alike)) / (places @ places)
+    slopes, off = _line(sizes[len(sizes) // 8 :], duration / len(sizes))
     columns = {"rate": rates.mean(axis=0), "error": errors, "even": slopes, "even_error": off}
     return [Exponent(**row) for row in by_rows(columns)]
 

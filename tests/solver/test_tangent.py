@@ -17,6 +17,7 @@ from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.period import common_period
 from brakecli.solver.system import System
+from brakecli.solver.tangent import exponents
 from tests.analysis.shoes import Tables, random_shoes
 from tests.campaign import campaign
 from tests.examples import MODE_COUPLING, SQUEAL, make
@@ -177,3 +178,24 @@ def test_few_samples_give_no_exponent() -> None:
     for samples, known in ((63, False), (64, True)):
         case = by_scheme(SQUEAL, "piecewise-exact", solver__duration=1e-4 * samples)
         assert (solve(replace(system_of(case), tangents=True)).exponent is not None) is known
+
+
+@pytest.mark.parametrize("memory", [0.1, 1.0, 3.0, 6.0], ids=str)
+def test_the_error_of_a_line_is_the_spread_of_its_slope_as_long_as_what_leaves_it_forgets(memory: float) -> None:
+    """Sizes that leave a line as a process of first order, which forgets within so many of 28.
+
+    The median error of 20,000 is the spread to 10 %. Beyond three errors lie no more than of Student's t with the
+    freedom that is left, which is 2 where it forgets within six: 10 %.
+    """
+    random = np.random.default_rng(17)
+    part = math.exp(-1.0 / memory)
+    noise = random.standard_normal((128, 20_000))
+    sizes = np.zeros_like(noise)
+    for n in range(1, 128):
+        sizes[n] = part * sizes[n - 1] + math.sqrt(1.0 - part**2) * noise[n]
+    growth = np.diff(sizes[-33:], axis=0) - 3.0
+    found = exponents(growth, 32.0)
+    slopes = np.array([each.even for each in found])
+    errors = np.array([each.even_error for each in found])
+    assert np.median(errors) == pytest.approx(np.std(slopes), rel=0.1)
+    assert (np.abs(slopes + 3.0) > 3.0 * errors).mean() < 0.1
