@@ -28,8 +28,8 @@ from brakecli.solver.quantities import HISTORY
 from brakecli.solver.records import PARTS, new
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schemes import NUMEROV
-from brakecli.solver.steady_sliding import sliding
-from brakecli.solver.system import Initial, System
+from brakecli.solver.steady_sliding import off_by_nodes, sliding
+from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, Exponent, exponents
 
 LEFT = 1e-3
@@ -42,6 +42,8 @@ _CONTRACTION = 0.1  # of the iteration, at most
 _MOST_BYTES = 1e8
 _MOST_STEPS = 1e9
 _MOST_PASSED = 1e6  # waves, beyond which their phase needs more than 16 digits
+
+Start = tuple[float, float, float, float]
 
 
 def fits(system: System) -> Hashable | None:
@@ -149,7 +151,7 @@ def filled(systems: Sequence[System]) -> Any:
     """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
     columns = np.array([each.coefficients for each in systems]).T
     c = Coefficients(**dict(zip(Coefficients._fields, columns, strict=True)))
-    start = np.array([_start(each) for each in systems]).T
+    start, off = (np.array(each).T for each in zip(*map(_start, systems), strict=True))
     h = systems[0].step
     wheel = systems[0].wheel
     load, belt, k = np.array([(each.load_at_start, each.belt_speed, each.layer_stiffness) for each in systems]).T
@@ -180,6 +182,8 @@ def filled(systems: Sequence[System]) -> Any:
     error.x, error.y = np.transpose([each.start_error or (0.0, 0.0) for each in systems])
     error.x_old = error.x
     error.y_old = error.y
+    nodes = o.by_nodes
+    nodes.x, nodes.y = nodes.x_old, nodes.y_old = off
     _seed(o.disturbed, np.sqrt((c.c_xx + c.c_yy + 2.0 * systems[0].half_length * k) / c.m), h)
     return o
 
@@ -193,8 +197,13 @@ def _seed(disturbed: Any, rate: Floats, h: float) -> None:
     disturbed.y_old = disturbed.y + 0.5 * h
 
 
-def _start(system: System) -> tuple[float, float, float, float]:
-    """x, y, vx and vy at t = 0; NaN where there is no steady sliding to start from."""
+def _start(system: System) -> tuple[Start, tuple[float, float]]:
+    """x, y, vx and vy at t = 0, NaN where there is no steady sliding to start from; how far nodes put it off."""
     initial = system.initial
-    rest = (sliding(system) or Initial(math.nan)) if initial.from_equilibrium else Initial()
-    return initial.x + rest.x, initial.y + rest.y, initial.vx, initial.vy
+    start = initial.x, initial.y, initial.vx, initial.vy
+    if not initial.from_equilibrium:
+        return start, (0.0, 0.0)
+    if (rest := sliding(system)) is None:
+        return (math.nan, math.nan, initial.vx, initial.vy), (0.0, 0.0)
+    off = (0.0, 0.0) if system.start_error is None else off_by_nodes(system, rest)
+    return (initial.x + rest.x, initial.y + rest.y, initial.vx, initial.vy), off

@@ -15,12 +15,13 @@ from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
+from brakecli.solver.motion.record import BY_NODES, BY_STEPS
 from brakecli.solver.plant import PLANT
 from brakecli.solver.quantities import HISTORY, Failure
 from brakecli.solver.records import COEFFICIENTS, GRID, WEIGHTS, Pair, filled, one
 from brakecli.solver.roughness import turn_wheel
 from brakecli.solver.schedules import Schedule, integral_at, slope_at
-from brakecli.solver.steady_sliding import steady_sliding
+from brakecli.solver.steady_sliding import off_by_nodes, steady_sliding
 from brakecli.solver.steps.loop import advance, take_sample
 from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, MOST_POWERS, Exponent, exponents, seed
@@ -151,12 +152,14 @@ class Stepping:
         self._carries = system.tangents and system.method.own_steps
         if self._carries:
             seed(self.tangent)
+        self._off = (0.0, 0.0)
         self._begin()
         if system.start_error is not None:
             self.tangent.knows = 1
             self.tangent.unsure = math.inf
             self.tangent.moved = math.inf
-            plant.block.columns[0, :2] = system.start_error
+            plant.block.columns[BY_STEPS, :2] = system.start_error
+            plant.block.columns[BY_NODES, :2] = self._off
             self.tangent.most = system.most_error
         if system.tracked:
             follow(self.plant.track, self.state.v_x)
@@ -253,6 +256,8 @@ class Stepping:
             rest = steady_sliding(system)
             x = x + rest.x
             y = y + rest.y
+            if system.start_error is not None:
+                self._off = off_by_nodes(system, rest)
         self._evaluate_at(x, y, 0.0)
         velocity = (initial.vx, initial.vy)
         acceleration = (0.0, 0.0)

@@ -205,7 +205,8 @@ def test_a_run_that_fails_keeps_nothing_and_is_repeated_with_shorter_steps() -> 
 
 @campaign
 def test_the_exact_contact_is_taken_where_nodes_are_dearer() -> None:
-    case = promised(OPEN, 1e-6, solver__scheme="two-layer", solver__duration=0.0005)
+    one = {"wheel": {"amplitudes": [1e-4], "wavelengths": [0.025]}}
+    case = promised({**OPEN, "roughness": one}, 1e-6, solver__scheme="two-layer", solver__duration=0.0005)
     found = certify(system_of(case))
     assert found.certificate.certified
     assert "exact" in found.motion.work.evaluators

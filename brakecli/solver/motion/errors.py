@@ -15,13 +15,11 @@ from brakecli.solver.contact.cells import left_out
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion.forces import NEAR, act, cone
 from brakecli.solver.motion.phases import OPEN, STICK, side_of
-from brakecli.solver.motion.record import STAGES, V_X, V_Y, X, Y
+from brakecli.solver.motion.record import BY_NODES, BY_STEPS, STAGES, V_X, V_Y, X, Y
 from brakecli.solver.motion.tableaus import END_STAGE, interpolated_both, reach
 from brakecli.solver.plant import Plant
 from brakecli.solver.records import SPANS
 
-BY_STEPS, BY_NODES, KNOWN = range(3)
-"""Columns of the motion's error, and how many there are; that of a disturbance lies behind them."""
 _RULES = [np.polynomial.legendre.leggauss(points) for points in (5, 3, 12)]
 POINTS = np.array([len(places) for places, _ in _RULES])
 """Places in a step of DOP853, of DOPRI5, whose continuous solutions are of order seven and four, and in a step in
@@ -162,7 +160,8 @@ def grow(p: Plant, tables: Floats, scratch: Floats, h: float) -> None:
         for i in range(4):
             worst[0, i] = max(worst[0, i], _size(e[i]))
             worst[1, i] = max(worst[1, i], _size(n[i]))
-            worst[2, i] = max(worst[2, i], _size(e[i] + n[i]))
+            # each is known to a part of itself: neither takes anything off the other
+            worst[2, i] = max(worst[2, i], _size(e[i]) + _size(n[i]))
     _ahead(p, h - step)
     if c.phi > 0.0 and r.lowest < NEAR * t.moved:  # without friction nothing happens there
         t.unsure = min(t.unsure, m.base + m.time)

@@ -16,6 +16,8 @@ AHEAD = 4 + 2 * MARGINS + 2
 vectors."""
 COLUMNS = 4
 """Small disturbances that are carried along, at most: the derivative by the state at the begin."""
+BY_STEPS, BY_NODES, KNOWN = range(3)
+"""Columns of the motion's error, and how many there are; that of a disturbance lies behind them."""
 MOST_EVENTS = 256
 """Events of a span; one with more of them is given up."""
 MOST_SMOOTH_EVENTS = 60

@@ -18,6 +18,7 @@ from brakecli.solver.motion.phases import HEIGHT, OPEN, STICK, carried, sliding_
 from brakecli.solver.motion.record import (
     BELT,
     BELT_SLOPE,
+    KNOWN,
     LOAD_SLOPE,
     POWERED,
     RUNGE_KUTTA,
@@ -121,7 +122,7 @@ def put_at_start(p: Plant, tables: Floats, scratch: Floats) -> None:
     for i in range(4):
         m.largest[i] = abs(m.z[i])
     if p.tangent.on == 1 or p.tangent.knows == 1:
-        m.count = errors.KNOWN + p.tangent.on
+        m.count = KNOWN + p.tangent.on
     r.tolerance = _LOCAL * p.grid.tolerance
     r.light = 1 if p.layer.pad.nodes > 0 else 0
     r.pair = 1 if r.light == 1 and p.grid.tolerance >= _LOOSE else 0
