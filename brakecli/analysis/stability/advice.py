@@ -32,9 +32,9 @@ DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
 _LEAST = 1e-6  # least advice where the value is 0, over what is large for it
 _DECOUPLED = 0.0  # °, where a link does not couple x and y: a shoe may be stable there alone
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
-# of a derivative, as a part of the value; averages over roughness are noisy
-_STEP = 1e-3
-_ROUGH_STEP = 0.1
+# of a derivative, as a part of the value; averages over roughness are noisy, and bend: the surer step counts
+_STEPS = (1e-3,)
+_ROUGH_STEPS = (0.1, 0.05)
 _ROUNDING = 1e-12  # of an answer
 _FARTHER = 1.2  # times the critical friction: up to there a changed case is searched for its own
 # a search for the critical friction goes on so far beyond what has to be safe
@@ -177,9 +177,10 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
         return answer(there, up_to) if there else None
 
     noisy = _rough(case) and (path[0] == "roughness" or path[-1] == "half_length")
-    step = (_ROUGH_STEP if noisy else _STEP) * (abs(at) or _scale(case, parameter))
-    slope, error = _derivative(lambda x: getattr(found(x), "critical", None), at, step)
-    rate, _ = _derivative(lambda x: getattr(found(x), "growth", None), at, step)
+    size = abs(at) or _scale(case, parameter)
+    steps = [part * size for part in (_ROUGH_STEPS if noisy else _STEPS)]
+    slope, error = _surest(lambda x: getattr(found(x), "critical", None), at, steps)
+    rate, _ = _surest(lambda x: getattr(found(x), "growth", None), at, steps)
     elasticity = slope * at / critical if slope is not None and critical and at else None
     return Sensitivity(parameter, value, elasticity, None if listed else slope, error, rate)
 
@@ -335,6 +336,14 @@ def _scale(case: Case, parameter: str) -> float:
     stiffness = 2.0 * case.contact.half_length * case.contact.stiffness
     kinds = {"stiffness": stiffness, "damping": 2.0 * math.sqrt(stiffness * case.shoe.mass)}
     return kinds.get(parameter.rpartition(".")[2], 1.0)
+
+
+def _surest(
+    f: Callable[[float], float | None], x: float, steps: Sequence[float]
+) -> tuple[float | None, float | None]:
+    """The derivative with the least error by one of the steps."""
+    each = (_derivative(f, x, step) for step in steps)
+    return min(each, key=lambda found: math.inf if found[1] is None else found[1])
 
 
 def _derivative(f: Callable[[float], float | None], x: float, step: float) -> tuple[float | None, float | None]:
