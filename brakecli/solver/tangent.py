@@ -16,6 +16,8 @@ from brakecli.solver.records import PARTS
 
 BATCHES = 8
 """Batches of the parts of the second half of a run; of twice as many parts each, half as many."""
+SURE = 3.0
+"""Errors of a trend of rates beyond which it is none by chance; a choice."""
 FEWEST_SAMPLES = 64
 """Fewest samples of a run with an exponent: its growth is noted at them."""
 LEAST = 1e-280
@@ -75,19 +77,27 @@ def _line(sizes: Floats, apart: float) -> tuple[Floats, Floats]:
     return slopes, errors
 
 
+def _trend(rates: Floats) -> Floats:
+    """By how much a line through rates rises from the first to the last; 0 where it is less than `SURE` errors."""
+    slopes, errors = _line(rates, 1.0)
+    found: Floats = np.where(np.abs(slopes) > SURE * errors, np.abs(slopes) * len(rates), 0.0)
+    return found
+
+
 def exponents(logs: Floats, duration: float) -> list[Exponent]:
     """The exponents in the second half of runs, with their standard errors.
 
     Within a cycle a disturbance swings: its size is a mean over a batch. What wanders slowly is alike in
     neighbouring batches, which tell too little of it: the error is the larger of those by all batches and by half
-    as many. `logs`: ln of the growth in each part, in the columns of runs. `even` is by the whole of a run but its
-    first eighth.
+    as many. A trend that surely is there goes on: what it has changed is in the error, too.
+
+    `logs`: ln of the growth in each part, in the columns of runs. `even` is by a run but for its first eighth.
     """
     sizes = np.cumsum(logs, axis=0).reshape(4 * BATCHES, -1, logs.shape[1]).mean(axis=1)
     late = sizes[2 * BATCHES :].reshape(BATCHES, 2, -1).mean(axis=1)
     rates = np.diff(late, axis=0) * (2 * BATCHES / duration)
     longer = np.diff(late.reshape(BATCHES // 2, 2, -1).mean(axis=1), axis=0) * (BATCHES / duration)
-    errors = np.maximum(_error_of_mean(rates), _error_of_mean(longer))
+    errors = np.hypot(np.maximum(_error_of_mean(rates), _error_of_mean(longer)), _trend(rates))
     slopes, off = _line(sizes[len(sizes) // 8 :], duration / len(sizes))
     columns = {"rate": rates.mean(axis=0), "error": errors, "even": slopes, "even_error": off}
     return [Exponent(**row) for row in by_rows(columns)]

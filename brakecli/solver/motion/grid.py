@@ -434,6 +434,8 @@ def fly_on_grid(p: Plant, tables: Floats, scratch: Floats, span: float) -> int:
         until = (n + 1) * r.grid
         while until - m.time > _WHOLE * m.h:
             _take(p, tables, scratch, until - m.time)
+            if stopped(p.layer.pad.signals):  # the contact is empty then, and time may not go on
+                return INTERRUPTED
             if not abs(m.z[X]) + abs(m.z[Y]) + abs(m.z[V_X]) + abs(m.z[V_Y]) < BOUND:
                 return LOST
             ends = pass_event(p, scratch) if m.which != NO_EVENT else DONE
@@ -441,8 +443,6 @@ def fly_on_grid(p: Plant, tables: Floats, scratch: Floats, span: float) -> int:
                 return ends
             _look(p)
         m.time = until
-        if stopped(p.layer.pad.signals):
-            return INTERRUPTED
     _note_border(p)
     rate(p, m.phase, m.z, 0.0, m.velocity)
     return DONE
