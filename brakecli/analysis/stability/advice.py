@@ -32,9 +32,9 @@ DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
 _LEAST = 1e-6  # least advice where the value is 0, over what is large for it
 _DECOUPLED = 0.0  # °, where a link does not couple x and y: a shoe may be stable there alone
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
-# of a derivative, as a part of the value; averages over roughness are noisy, and bend: the surer step counts
-_STEPS = (1e-3,)
-_ROUGH_STEPS = (0.1, 0.05)
+# of a derivative, as a part of the value; averages over roughness are noisy, and bend: there a half is tried, too
+_STEP = 1e-3
+_ROUGH_STEP = 0.1
 _ROUNDING = 1e-12  # of an answer
 _FARTHER = 1.2  # times the critical friction: up to there a changed case is searched for its own
 # a search for the critical friction goes on so far beyond what has to be safe
@@ -177,8 +177,8 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
         return answer(there, up_to) if there else None
 
     noisy = _rough(case) and (path[0] == "roughness" or path[-1] == "half_length")
-    size = abs(at) or _scale(case, parameter)
-    steps = [part * size for part in (_ROUGH_STEPS if noisy else _STEPS)]
+    step = (_ROUGH_STEP if noisy else _STEP) * (abs(at) or _scale(case, parameter))
+    steps = [step, 0.5 * step] if noisy else [step]
     slope, error = _surest(lambda x: getattr(found(x), "critical", None), at, steps)
     rate, _ = _surest(lambda x: getattr(found(x), "growth", None), at, steps)
     elasticity = slope * at / critical if slope is not None and critical and at else None
