@@ -138,4 +138,4 @@ def test_an_address_space_too_small_for_the_libraries_is_told_before_they_are_lo
 @campaign
 def test_an_address_space_that_is_just_large_enough_is(here: Path) -> None:
     for command in ("run tiny.toml", "compare-schemes tiny.toml --budget 1"):  # the second compiles every scheme
-        shell(f"ulimit -v 1055000; $B {command} -q", here, **lazily(here)).told(0)
+        shell(f"ulimit -v 1400000; $B {command} -q", here, **lazily(here)).told(0)
