@@ -45,7 +45,7 @@ CITATION = f"""\
 LIBRARIES = 1_430_000_000
 """Bytes of address space to load the libraries and compile all kernels; with less, LLVM aborts or never ends.
 
-Measured: a `compare-schemes` that compiles the kernels of all schemes aborts with 1,331 MB, and ends with 1,434 MB.
+Measured: a `compare-schemes` that compiles the kernels of all schemes aborts with 1,331 MB, and ends with 1,434.
 """
 
 app = typer.Typer(
