@@ -81,7 +81,7 @@ class Work:
 class OwnError(NamedTuple):
     """What a run knows of its error: the largest of each component in each span of the run (m, m/s)."""
 
-    worst: Floats  # spans, by steps, nodes and both, x y vx vy
+    worst: Floats  # spans, by steps, by nodes and their sum, x y vx vy
     unsure: float  # s, from which on it may be another, as an event may have been missed; infinite where none
     amplification: float | None  # of a small disturbance of the start, at most, where one is carried along
 

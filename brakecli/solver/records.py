@@ -106,7 +106,7 @@ TANGENT = record(
     knows=int,  # 1 where the error of the motion is
     beyond=int,  # 1 where it is more than the most
     logs=(float, PARTS),  # ln of its growth in each part of the run
-    worst=(float, (SPANS, 3, 4)),  # their largest size in each span of the run, and that of their sum
+    worst=(float, (SPANS, 3, 4)),  # their largest sizes in each span of the run, and that of the sum of both
 )
 """A disturbance, and the error of a motion, that are carried along with it, see `solver.tangent`."""
 

@@ -78,7 +78,7 @@ def _line(sizes: Floats, apart: float) -> tuple[Floats, Floats]:
 
 
 def _trend(rates: Floats) -> Floats:
-    """By how much a line through rates rises from the first to the last; 0 where it is less than `SURE` errors."""
+    """By how much a line rises or falls over all rates; 0 where its slope is less than `SURE` of its errors."""
     slopes, errors = _line(rates, 1.0)
     found: Floats = np.where(np.abs(slopes) > SURE * errors, np.abs(slopes) * len(rates), 0.0)
     return found

@@ -199,3 +199,14 @@ def test_the_error_of_a_line_is_the_spread_of_its_slope_as_long_as_what_leaves_i
     errors = np.array([each.even_error for each in found])
     assert np.median(errors) == pytest.approx(np.std(slopes), rel=0.1)
     assert (np.abs(slopes + 3.0) > 3.0 * errors).mean() < 0.1
+
+
+def test_a_rate_that_surely_goes_on_changing_has_that_in_its_error() -> None:
+    """Seven rates 0.2 1/s apart rise by 1.4 1/s; means of pairs are 0.4 apart, and their error is 0.4 √(8/15).
+
+    Of rates that swing about one value none is a trend.
+    """
+    parts = np.arange(32.0)
+    rising, swinging = exponents(np.stack([0.1 * parts - 3.0, 0.3 * np.cos(2.5 * parts) - 3.0], axis=1), 32.0)
+    assert rising.error == pytest.approx(math.hypot(0.4 * math.sqrt(8.0 / 15.0), 1.4), rel=1e-9)
+    assert swinging.error < 0.1
