@@ -42,11 +42,8 @@ CITATION = f"""\
 }}"""
 """How to cite the program and the paper, in BibTeX; CITATION.cff says the same."""
 
-LIBRARIES = 1_430_000_000
-"""Bytes of address space to load the libraries and compile all kernels; with less, LLVM aborts or never ends.
-
-Measured: a `compare-schemes` that compiles the kernels of all schemes aborts with 1,331 MB, and ends with 1,434.
-"""
+LIBRARIES = 1_075_000_000
+"""Bytes of address space for the libraries and compiled kernels; to compile these takes `compiling.KERNELS`."""
 
 app = typer.Typer(
     name="brakecli",

@@ -158,10 +158,10 @@ def test_linear_algebra_takes_one_thread_in_a_worker_and_ours_here(
 
 @campaign
 def test_a_point_without_memory_fails_with_the_reason_and_exit_code_1(tmp_path: Path) -> None:
-    durations = axis("solver.duration", "values = [0.02, 200.0, 0.03]")
+    durations = axis("solver.duration", "values = [0.02, 100.0, 0.03]")
     write_sweep(tmp_path, durations, case=TINY.replace("sample_interval = 1e-4", "sample_interval = 1e-5"))
-    done = shell("ulimit -v 1450000; $B sweep s.toml --json -q -j 1", tmp_path, OPENBLAS_NUM_THREADS="1")
-    done.told(1, "point 1 (solver.duration = 200.0): out of memory", "1 of 3 points failed")
+    done = shell("ulimit -v 1200000; $B sweep s.toml --json -q -j 1", tmp_path, OPENBLAS_NUM_THREADS="1")
+    done.told(1, "point 1 (solver.duration = 100.0): out of memory", "1 of 3 points failed")
     assert done.json["status"] == ["done", "failed", "done"]
 
 
