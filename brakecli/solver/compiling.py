@@ -72,7 +72,8 @@ def begins() -> None:
     global _notice
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if resource.RLIM_INFINITY != limit < KERNELS:
-        what = f"the address space is limited to {limit / 1e6:.0f} MB, and compiling kernels needs {KERNELS / 1e6:.0f} MB"
+        limited = f"the address space is limited to {limit / 1e6:.0f} MB"
+        what = f"{limited}, and compiling kernels needs {KERNELS / 1e6:.0f} MB"
         raise RefusedError(f"{what}; raise the limit with: ulimit -v unlimited")
     notice = _notice
     _notice = None
