@@ -124,7 +124,7 @@ EXPONENT = within(
     Field(
         "lyapunov_error",
         "1/s",
-        "standard error of that rate, with the drift of what has not settled",
+        "standard error of that rate, with the drift of what has not settled, and with a trend that is sure",
     ),
 )
 RUN = (
