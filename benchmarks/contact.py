@@ -132,7 +132,7 @@ def of_one_evaluation(system: System, nodes: int) -> dict[str, float]:
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, nodes)
     layers = {}
     repeat = compiler().njit(_repeat)
-    for name in ("midpoint", "exact", "closed-form"):
+    for name in ("midpoint", "cells", "exact", "closed-form"):
         layers[name] = build_layer(name, pad)
         layers[name].contact.reach = REACH
         work[name] = partial(repeat, *layers[name], CALLS)

@@ -13,11 +13,11 @@ from statistics import median
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
-from brakecli.solver.contact import midpoint
+from brakecli.solver.contact.midpoint import evaluate
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.integrate import Stepping
+from brakecli.solver.kernels import compiler
 from brakecli.solver.method import Method
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
@@ -74,13 +74,12 @@ def in_turns(one: Callable[[], float], other: Callable[[], float]) -> tuple[floa
     return first, second
 
 
-@njit
-def _evaluations(count, x, y, travel, evaluate, layer, omega):  # type: ignore[no-untyped-def]
+def _evaluations(count, x, y, travel, layer, tables, scratch, omega):  # type: ignore[no-untyped-def]
     total = 0.0
     for n in range(count):
         for i in range(omega.size):
-            layer.angles[i] = -omega[i] * (travel + 1e-6 * n)
-        evaluate(x + 1e-9 * n, y, layer)
+            scratch[layer.angles_at + i] = -omega[i] * (travel + 1e-6 * n)
+        evaluate(x + 1e-9 * n, y, layer, tables, scratch)
         total += layer.contact.normal_force
     return total
 
@@ -107,7 +106,8 @@ def _measured(load: Callable[[], System]) -> list[Beside]:
     f1 = shoe[0] @ np.sin(np.outer(shoe[1], xi) + system.shoe.phase[:, None])
     parts = [f1, *(wheel[0][:, None] * f(np.outer(wheel[1], xi)) for f in (np.sin, np.cos))]
     omega = np.ascontiguousarray(system.wheel.omega)
-    layer = build_layer(system.evaluate, pad)
+    contact = build_layer(system.evaluator, pad)
+    evaluations = compiler().njit(_evaluations)
     per_gap = system.layer_stiffness * spacing
     with tempfile.TemporaryDirectory() as folder:
         library = compiled(folder, len(omega))
@@ -115,7 +115,7 @@ def _measured(load: Callable[[], System]) -> list[Beside]:
         results: list[Any] = [None, None]
 
         def ours() -> None:
-            results[0] = _evaluations(COUNT, X, Y, TRAVEL, midpoint.evaluate, layer, omega)
+            results[0] = evaluations(COUNT, X, Y, TRAVEL, *contact, omega)
 
         def theirs() -> None:
             results[1] = library.evaluations(COUNT, X, Y, TRAVEL) * per_gap
