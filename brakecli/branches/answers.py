@@ -1,6 +1,5 @@
 """What branches of a case answer: where it squeals by itself, and where it can vibrate beside stable sliding."""
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
@@ -76,7 +75,7 @@ class Answers:
     @property
     def _slides(self) -> list[Slide]:
         """Where there is steady sliding, or a shoe that locks."""
-        return [slide for slide in self.explored.slides if not math.isnan(slide.tests[0])]
+        return [slide for slide in self.explored.slides if slide.signs is not None]
 
     @cached_property
     def windows(self) -> list[tuple[Bound, Bound]]:

@@ -1,29 +1,25 @@
 """Steady sliding along a line of cases: eigenvalues, where it flutters or diverges, and the cycles born there."""
 
 import math
-import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import lru_cache
-from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.stability.modes import Complex, eigensystem, is_undamped, routh_hurwitz
+from brakecli.analysis import margin
+from brakecli.analysis.margin import grows
+from brakecli.analysis.stability.certain import Rounded, conditions, links_with
+from brakecli.analysis.stability.modes import Complex, eigensystem
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.line import Line
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.errors import CaseError
-from brakecli.solver.roots import bracketed_root
 from brakecli.solver.steady_sliding import PRESSED, steady_sliding, tabulated
 
 PLACES = 65
-"""Places at which steady sliding is looked at; between them a test that may vanish twice is followed down."""
-LOCATED = 1e-14
-"""Width of the bracket of a change."""
-SEARCHES = 30
-GOLDEN = 0.3819660112501051
+"""Places at which steady sliding is looked at."""
 BELOW_GRAZING = 0.9
 """Part of the amplitude that grazes at which the family of linear vibrations is begun."""
 SMALL = 0.03
@@ -34,22 +30,21 @@ PHASES = 720
 
 @dataclass(frozen=True, slots=True)
 class Slide:
-    """Steady sliding at a place of the line; no eigenvalues (1/s) where there is none."""
+    """Steady sliding at a place of the line; no eigenvalues (1/s) where there is none.
+
+    `signs` are its margin, see `analysis.margin`; where a smooth shoe locks there is one, but no steady sliding.
+    """
 
     p: float
     eigenvalues: Complex | None
     vectors: Complex | None
     rest: tuple[float, float] | None
-    tests: tuple[float, float]
-    """Tests of divergence and of flutter: smooth, and positive where there is neither; NaN without steady sliding.
-
-    Where a shoe on smooth pads locks, the first one is negative.
-    """
+    signs: list[Rounded] | None
 
     @property
     def stable(self) -> bool:
-        """Whether all disturbances decay."""
-        return min(self.tests) > 0.0
+        """Whether no disturbance surely grows."""
+        return not grows(self.signs)
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +62,7 @@ def stable_spans(
     slides: Sequence[Slide], changes: Sequence[Change]
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """The parts of the line where it is stable: both ends of each, with their errors."""
-    there = [slide for slide in slides if not math.isnan(slide.tests[0])]
+    there = [slide for slide in slides if slide.signs is not None]
     if not there:
         return []
     edges = [(change.p, change.error) for change in changes]
@@ -86,7 +81,7 @@ class Sliding:
 
     def _at(self, p: float) -> Slide:
         """Steady sliding at a place."""
-        nothing = Slide(p, None, None, None, (math.nan, math.nan))
+        nothing = Slide(p, None, None, None, None)
         line = self.line
         try:
             if line.smooth:
@@ -106,73 +101,33 @@ class Sliding:
         if belt == 0.0 or not (pressed or locks):
             return nothing
         grip = c.grip(belt)
-        b = (c.b_xx, c.b_xy, c.b_yy)
-        links = (c.c_xx, c.c_xy, c.c_yy)
-        determinant, apart = routh_hurwitz(c.m, b, links, stiffness, grip, damped=not is_undamped(c))
+        signs = conditions(links_with(c), stiffness, grip)
         if locks:  # beyond divergence there is no steady sliding, and the determinant says where it ended
-            return replace(nothing, tests=(min(float(determinant), -sys.float_info.min), math.nan))
+            return Slide(p, None, None, None, signs)
         values, vectors = eigensystem(c, stiffness, grip)
-        return Slide(p, values, vectors, rest, (float(determinant), float(apart)))
+        return Slide(p, values, vectors, rest, signs)
 
-    def along(self, places: int = PLACES) -> list[Slide]:
-        """Steady sliding along the whole line, with further places where a test has its extremes."""
-        found = [self.at(k / (places - 1)) for k in range(places)]
-        more = []
-        for one, middle, other in zip(found, found[1:], found[2:], strict=False):
-            for test in range(2):
-                a, b, c = (each.tests[test] for each in (one, middle, other))
-                if math.copysign(1.0, a) == math.copysign(1.0, b) == math.copysign(1.0, c) and abs(b) < min(
-                    abs(a), abs(c)
-                ):
-                    more.append(self._extreme(one.p, other.p, test, math.copysign(1.0, b)))
-        return sorted([*found, *more], key=lambda slide: slide.p)
+    def _margin(self, p: float) -> list[Rounded] | None:
+        return self.at(p).signs
 
-    def _extreme(self, left: float, right: float, test: int, sign: float) -> Slide:
-        """The place between two at which a test is nearest to zero, or beyond it; by the golden section."""
-
-        def height(p: float) -> float:
-            return sign * self.at(p).tests[test]
-
-        a = left + GOLDEN * (right - left)
-        b = right - GOLDEN * (right - left)
-        at_a = height(a)
-        at_b = height(b)
-        for _ in range(SEARCHES):
-            if min(at_a, at_b) < 0.0:
-                break
-            if at_a < at_b:
-                right = b
-                b = a
-                at_b = at_a
-                a = left + GOLDEN * (right - left)
-                at_a = height(a)
-            else:
-                left = a
-                a = b
-                at_a = at_b
-                b = right - GOLDEN * (right - left)
-                at_b = height(b)
-        return self.at(a if at_a < at_b else b)
+    def along(self) -> list[Slide]:
+        """Steady sliding along the whole line, with further places where its margin has extremes."""
+        return [self.at(p) for p in margin.places(self._margin, np.linspace(0.0, 1.0, PLACES).tolist())]
 
     def changes(self, slides: list[Slide]) -> list[Change]:
         """Where stability is lost or regained, in the order of p."""
         found = []
-        for one, other in pairwise(slides):
-            if math.isnan(one.tests[0]) or math.isnan(other.tests[0]) or one.stable == other.stable:
+        for change in margin.between(self._margin, [slide.p for slide in slides]):
+            if change.which is None:  # steady sliding itself ends
                 continue
-            test = 0 if one.tests[0] * other.tests[0] < 0.0 else 1
-            p, error = self._zero(test, one.p, other.p)
             frequency = 0.0
-            if test == 1:
-                values = self.at(p).eigenvalues
+            if change.which == margin.FLUTTER:
+                values = self.at(change.value).eigenvalues
                 assert values is not None
                 frequency = abs(float(values[int(np.argmax(values.real))].imag)) / (2.0 * math.pi)
-            found.append(Change("divergence" if test == 0 else "flutter", p, error, frequency, one.stable))
+            kind = "flutter" if change.which == margin.FLUTTER else "divergence"
+            found.append(Change(kind, change.value, change.error, frequency, change.lost))
         return found
-
-    def _zero(self, test: int, low: float, high: float) -> tuple[float, float]:
-        """Where a test passes zero between two places, and half the width of its bracket."""
-        return bracketed_root(lambda p: self.at(p).tests[test], low, high, absolute=LOCATED), LOCATED
 
     def _rises(self, p: float, y: float) -> float:
         """How far (m) the shoe may rise from a height y (m) until the stiffness of the contact changes."""

@@ -12,11 +12,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.stability.certain import EPSILON, Rounded, conditions, links_of
+from brakecli.analysis.margin import Margin, between, changes, grows
+from brakecli.analysis.stability.certain import Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN, stability
-from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
@@ -28,17 +28,12 @@ from brakecli.sweeps.lyapunov import Steady, by_exponents
 from brakecli.sweeps.read_off import PART, explored, on_waves
 from brakecli.sweeps.sustained import sustained
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined, of_edges
+from brakecli.sweeps.windows import Edge, Outcome, Search, of_edges
 
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 _OPENS = 0.999  # part of the stiffness of the whole pad, below which it opens
 _FINEST = 1e-9  # bracket of a change over the requested one, where evaluations are cheap
-_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `hidden`
-
-Signs = list[Rounded] | None
-"""What is positive where sliding is stable; None where there is no steady sliding."""
-EdgeIn = Callable[[float, float], Edge]
 
 
 def search(critical: Critical, line: Line) -> Search:
@@ -99,7 +94,7 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
     @cache
-    def signs_at(value: float) -> Signs:
+    def signs_at(value: float) -> list[Rounded] | None:
         try:
             system = system_of(case_at(value))
             links = links_of(case_at(value))
@@ -113,30 +108,26 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
         pressed = links.pressed * Rounded(system.load_at_start)
         return [*conditions(links, system.contact_stiffness, grip), pressed]
 
-    def grows_in_steps(value: float) -> bool:
+    @cache
+    def in_steps(value: float) -> list[Rounded] | None:
         if (found := steady_at(value)) is None:
-            return True
+            return None
         system, rest = found
-        return spectral_radius(system, rest.stiffness, system.coefficients.phi) > 1.0 + MARGIN
+        return [Rounded(1.0 + MARGIN - spectral_radius(system, rest.stiffness, system.coefficients.phi))]
 
     first = steady_at(critical.lower)
     opens = first is not None and first[1].stiffness < _OPENS * first[0].contact_stiffness
     width = critical.tolerance * (PART if opens else _FINEST)
 
-    def searched(unstable: Callable[[float], bool], edge: EdgeIn, count: int, middles: list[float]) -> Search:
+    def searched(margin: Margin, count: int, middles: list[float]) -> Search:
         values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *middles})
         if all(steady_at(value) is None for value in values):
             return Search(Outcome.NO_SLIDING)
-        return joined(critical, [Piece(value, value, unstable(value)) for value in values], edge)
-
-    def in_steps(low: float, high: float) -> Edge:
-        lost = grows_in_steps(high)
-        ends = bisect(lambda value: grows_in_steps(value) is not lost, low, high, width=width)
-        return Edge(0.5 * sum(ends), 0.5 * (ends[1] - ends[0]))
+        edges = [Edge(each.value, each.error) for each in changes(margin, values, width)]
+        return of_edges(critical, grows(margin(critical.lower)), edges)
 
     scanned = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
-    certain = partial(_certain, critical, signs_at, width=width)
-    exact = searched(lambda value: _grows(signs_at(value)), certain, scanned, [])
+    exact = searched(signs_at, scanned, [])
     exact = exact._replace(eigenvalue=exact.value)
     beside = exact.value and (steady_at(exact.lower) or steady_at(exact.upper))
     if not beside or beside[0].method.own_steps:
@@ -145,40 +136,9 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
         return exact
     ends = [critical.lower, *(end for window in exact.windows for end in window), critical.upper]
     middles = [0.5 * (low + high) for low, high in pairwise(ends)]
-    own = searched(cache(grows_in_steps), in_steps, SCANNED_WHERE_OPEN, middles)
+    own = searched(in_steps, SCANNED_WHERE_OPEN, middles)
     same = own.value is not None and exact.value is not None and exact.outcome is own.outcome
     return exact._replace(bias=own.value - exact.value) if same else exact  # type: ignore[operator]
-
-
-def _grows(signs: Signs) -> bool:
-    """Whether disturbances surely grow, or there is no steady sliding."""
-    return signs is None or any(each.negative for each in signs)
-
-
-def _certain(
-    critical: Critical, signs_at: Callable[[float], Signs], low: float, high: float, *, width: float = 0.0
-) -> Edge:
-    """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does."""
-    lost = _grows(signs_at(high))
-    low, high = bisect(lambda value: _grows(signs_at(value)) is not lost, low, high, width=width)
-    stable, bound = (low, critical.lower) if lost else (high, critical.upper)
-    passing = {k for k, each in enumerate(signs_at(high if lost else low) or ()) if each.negative}
-
-    def hidden(value: float) -> bool:
-        """Whether rounding may hide what passes zero; where steady sliding ends that may be anything.
-
-        It was not surely negative at the end of the bracket: there its true value is above -2 errors, and rounding
-        alone takes none nearby below -4.
-        """
-        signs = [each for k, each in enumerate(signs_at(value) or ()) if k in passing or not passing]
-        return any(-_HIDDEN * each.error <= each.value <= each.error for each in signs)
-
-    stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
-    while hidden(stable) and stable != bound:
-        stable = (max if lost else min)(stable + stride, bound)
-        stride = 2.0 * stride
-    low, high = (stable, high) if lost else (low, stable)
-    return Edge(0.5 * (low + high), 0.5 * (high - low))
 
 
 def _friction_by_eigenvalues(critical: Critical, case: Case) -> Search:
@@ -188,20 +148,18 @@ def _friction_by_eigenvalues(critical: Critical, case: Case) -> Search:
     links = links_of(case)
 
     @cache
-    def signs_at(phi: float) -> Signs:
+    def signs_at(phi: float) -> list[Rounded] | None:
         k = report.stiffness_at(phi)
         return conditions(links, k, math.copysign(phi, report.belt_speed)) if math.isfinite(k) else None
 
     within = [each.friction for each in report.crossings if critical.lower <= each.friction <= critical.upper]
     ends = [critical.lower, *within, critical.upper]
-    edges = list[Edge]()
-    unstable = not report.stable
     middles = [0.5 * (low + high) for low, high in pairwise(ends)]
-    for phi, (low, high) in zip(within, pairwise(middles), strict=True):
-        if _grows(signs_at(low)) is not _grows(signs_at(high)):  # otherwise rounding hides both ends of a window
-            edge = _certain(critical, signs_at, low, high)
-            unstable = _grows(signs_at(low)) if not edges else unstable
-            edges.append(Edge(phi, abs(phi - edge.value) + edge.error))
+    edges = list[Edge]()
+    for change in between(signs_at, middles):
+        phi = min(within, key=lambda each: abs(each - change.value))
+        edges.append(Edge(phi, abs(phi - change.value) + change.error))
+    unstable = grows(signs_at(middles[0])) if edges else not report.stable
     held = system.coefficients.c_xx > 0.0  # otherwise there is steady sliding without friction only
     if not edges and (report.stable is None or report.belt_speed == 0.0 or not held):
         return Search(Outcome.NO_SLIDING)

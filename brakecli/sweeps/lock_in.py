@@ -3,15 +3,16 @@
 import csv
 import io
 from dataclasses import dataclass, replace
-from itertools import pairwise
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
+from brakecli.analysis.margin import changes
+from brakecli.analysis.stability.certain import Rounded, conditions, links_with
 from brakecli.analysis.stability.follow import followed
-from brakecli.analysis.stability.report import is_stable, stability
-from brakecli.analysis.stability.search import HALVINGS, bisect
+from brakecli.analysis.stability.report import stability
 from brakecli.case.case import given_toml
 from brakecli.case.read import LoadedCase
 from brakecli.case.roughness import Records
@@ -24,6 +25,7 @@ from brakecli.files.fields import TEXT
 from brakecli.files.write import new_result
 from brakecli.runs.run import origin
 from brakecli.solver.integrate import Counted
+from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 from brakecli.sweeps.plan import Plan
 from brakecli.sweeps.result import unit
@@ -65,27 +67,34 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
     for place, value in enumerate(values):
         progress("values", place, axis.size)
         reports.append(stability(system_at(value)))
-    sliding = (report.modes if report.stable is not None and report.belt_speed else () for report in reports)
+    there = (report.modes if report.stable is not None and report.belt_speed else () for report in reports)
     entries = []
-    for value, report, pair in zip(values, reports, followed(sliding), strict=True):
+    for value, report, pair in zip(values, reports, followed(there), strict=True):
         names = ("frequency", "growth", "damping_ratio")
         columns = ([mode and getattr(mode, name) for mode in pair or (None, None)] for name in names)
         found = dict(zip((field.name for field in fields.MODES), columns, strict=True))
         entries.append({"value": value, **values_of(fields.VARIED, report), **found})
     critical = list[float]()
-    turned = ((value, report) for value, report in zip(values, reports, strict=True) if report.belt_speed)
-    turning = [(value, report.stable is True) for value, report in turned]
-    for (low, before), (high, after) in pairwise(turning):
-        if before != after:
-            ends = sorted((low, high))
-            at_low = before if low < high else after
+    known = {value: report for value, report in zip(values, reports, strict=True) if report.belt_speed}
 
-            def as_below(value: float, at_low: bool = at_low) -> bool:
-                progress("critical values", len(critical), len(critical) + 1)
-                return (is_stable(system_at(value)) is True) == at_low
+    @cache
+    def signs_at(value: float) -> list[Rounded] | None:
+        if value not in known:
+            progress("critical values", len(critical), len(critical) + 1)
+        system = system_at(value)
+        rest = known[value].equilibrium if value in known else sliding(system)
+        return (
+            None
+            if rest is None or not rest.is_pressed(system.load_at_start)
+            else conditions(
+                links_with(system.coefficients), rest.stiffness, system.coefficients.grip(system.belt_speed)
+            )
+        )
 
-            middle = 0.5 * sum(bisect(as_below, ends[0], ends[1], halvings=HALVINGS))
-            critical.append(middle if abs(middle) > _ZERO * abs(values[-1] - values[0]) else 0.0)
+    for change in changes(signs_at, sorted(known)):
+        critical.append(change.value if abs(change.value) > _ZERO * abs(values[-1] - values[0]) else 0.0)
+    if values[-1] < values[0]:
+        critical.reverse()
     return LockIn(axis, entries, critical)
 
 

@@ -118,7 +118,7 @@ def pieces(answers: Answers) -> list[Piece]:
     """The range in parts: stable, unstable, or not known. Where nothing slides steadily it counts as unstable."""
     found = list[tuple[float, float, bool | None]]()
     last = 0.0
-    slides = [slide.p for slide in answers.explored.slides if not math.isnan(slide.tests[0])]
+    slides = [slide.p for slide in answers.explored.slides if slide.signs is not None]
     ends = (slides[0], slides[-1]) if slides else (1.0, 0.0)
     spans = [(low.p, high.p, True) for low, high in answers.windows]
     spans += [(low, high, False) for low, high in answers.stable_spans]

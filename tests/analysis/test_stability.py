@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.stability.modes import crossings, eigensystem, growth, modes
-from brakecli.analysis.stability.report import is_stable, stability, step_limit, undamped_critical
+from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
 from brakecli.case.system import system_of
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.pad import build_layer
@@ -184,7 +184,6 @@ def test_a_shoe_that_nothing_presses_is_not_called_stable(changes: dict[str, Any
     system = system_of(make(SQUEAL, **changes))
     found = stability(system)
     assert found.stable is None
-    assert is_stable(system) is None
     assert found.equilibrium is None
     assert "nothing presses the shoe" in str(found.no_equilibrium)
 

@@ -250,7 +250,7 @@ def test_steady_sliding_changes_where_the_eigenvalues_of_another_formula_do(numb
                 continue
         sliding = Sliding(Line(make(tables), [key], low, high))
         slides = sliding.along()
-        if any(math.isnan(slide.tests[0]) for slide in slides):
+        if any(slide.signs is None for slide in slides):
             continue  # somewhere sliding leaves the pad open
         own = zeros(tables, key, low, high)
         changes = sliding.changes(slides)

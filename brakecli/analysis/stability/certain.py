@@ -11,6 +11,7 @@ import numpy as np
 
 from brakecli.analysis.stability.modes import routh_hurwitz
 from brakecli.case.case import Case
+from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.links import sin_cos, tensor
 
 EPSILON = float(np.finfo(float).eps)  # twice what a rounding may be off by, so that bounds hold their own rounding
@@ -70,6 +71,17 @@ def links_of(case: Case) -> Links:
     b = tensor(Rounded(one.damping), Rounded(two.damping), beta, alpha)
     c = tensor(Rounded(one.stiffness), Rounded(two.stiffness), beta, alpha)
     return Links(Rounded(case.shoe.mass), b, c, c[0] * beta[1] - c[1] * beta[0])
+
+
+def links_with(c: Coefficients) -> Links:
+    """The links by the coefficients of a system, each of which is rounded."""
+    b = _rounded(c.b_xx), _rounded(c.b_xy), _rounded(c.b_yy)
+    stiffness = _rounded(c.c_xx), _rounded(c.c_xy), _rounded(c.c_yy)
+    return Links(_rounded(c.m), b, stiffness, _rounded(c.c_xx * c.sin_beta - c.c_xy * c.cos_beta))
+
+
+def _rounded(value: float) -> Rounded:
+    return Rounded(value, EPSILON * abs(value))
 
 
 def _inclined(degrees: float) -> tuple[Rounded, Rounded]:

@@ -8,22 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 
+from brakecli.analysis import margin
+from brakecli.analysis.stability.certain import Rounded, conditions, links_with
 from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
 from brakecli.analysis.stability.modes import (
-    Complex,
     Crossing,
     Mode,
     crossings,
     eigensystem,
     growth,
-    is_undamped,
     modes,
 )
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.links import natural_frequencies
-from brakecli.solver.roots import bracketed_root
 from brakecli.solver.steady_sliding import (
     UNPRESSED,
     WINDOWS,
@@ -45,9 +44,7 @@ WIDER = 4.0
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
 _GROWS = 1e-9  # growth (1/s) over the highest natural frequency (Hz), below which it is rounding
-_DECAYS = 1e-12  # growth over the largest eigenvalue (both 1/s), up to which dashpots have it decay
-_LOCATED = 1e-12  # error of the friction at which a scheme loses stability
-_HALVINGS = 50  # of a step of friction, after which neighbouring numbers are left
+_LOCATED = 1e-12  # bracket of the friction at which a scheme loses stability
 _STEP_HALVINGS = 60  # of the same for a step in time
 
 StiffnessAt = Callable[[float], float]
@@ -116,7 +113,7 @@ def stability(system: System) -> StabilityReport:
         equilibrium=rest,
         no_equilibrium=reason,
         contact_stiffness=k,
-        stable=_all_decay(c, values) if rest else None,
+        stable=not margin.grows(conditions(links_with(c), k, grip)) if rest else None,
         eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
@@ -154,20 +151,6 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
         return None
     grows = growth(c, k, c.grip(system.belt_speed)) > _GROWS * natural_frequencies(c, k)[1]
     return 0.0 if grows else None
-
-
-def is_stable(system: System) -> bool | None:
-    """Whether steady sliding is stable at the system's own friction; None where there is none."""
-    c = system.coefficients
-    belt = system.belt_speed
-    rest = sliding(system)
-    pressed = rest and rest.is_pressed(system.load_at_start)
-    return _all_decay(c, eigensystem(c, rest.stiffness, c.grip(belt))[0]) if rest and pressed else None
-
-
-def _all_decay(c: Coefficients, eigenvalues: Complex) -> bool:
-    tolerance = 0.0 if is_undamped(c) else _DECAYS * float(np.abs(eigenvalues).max())
-    return bool(eigenvalues.real.max() <= tolerance)
 
 
 def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | None, float | None]:
@@ -240,26 +223,20 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up
     if c.c_xx == 0.0:
         return []
 
-    def first_mode(phi: float) -> Mode | None:
+    @cache
+    def signs_at(phi: float) -> list[Rounded] | None:
         k = stiffness_at(phi)
-        return modes(c._replace(phi=phi), k, math.copysign(phi, belt))[0] if math.isfinite(k) else None
+        return conditions(links_with(c), k, math.copysign(phi, belt)) if math.isfinite(k) else None
 
-    def unstable(phi: float) -> bool | None:
-        mode = first_mode(phi)
-        return mode.growth > 0.0 if mode else None
-
-    frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1).tolist()
     found = []
-    for (low, high), (before, after) in zip(pairwise(frictions), pairwise(map(unstable, frictions)), strict=True):
-        if before is None or before == after or (before and after is None):
-            continue
-        # By halves: without dashpots the growth is zero on one side.
-        low, high = bisect(lambda phi: unstable(phi) == before, low, high, halvings=_HALVINGS)  # noqa: B023 - used at once
-        lost = unstable(high) is not False
-        mode = first_mode(high if lost else low)
-        frequency = mode.frequency if mode else 0.0
-        kind = "flutter" if frequency > 0.0 else "divergence"
-        found.append(Crossing(0.5 * (low + high), kind, frequency, lost))
+    frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1)
+    for change in margin.changes(signs_at, frictions.tolist()):
+        phi = change.value
+        if change.which == margin.FLUTTER:
+            frequency = modes(c._replace(phi=phi), stiffness_at(phi), math.copysign(phi, belt))[0].frequency
+            found.append(Crossing(phi, "flutter", frequency, change.lost))
+        elif change.which is not None or change.lost:
+            found.append(Crossing(phi, "divergence", 0.0, change.lost))
     return found
 
 
@@ -285,16 +262,15 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
     It is looked for up to twice the exact value.
     """
 
-    def excess(phi: float) -> float:
-        return spectral_radius(system, stiffness_at(phi), phi) - 1.0 - MARGIN
+    @cache
+    def signs_at(phi: float) -> list[Rounded]:
+        return [Rounded(1.0 + MARGIN - spectral_radius(system, stiffness_at(phi), phi))]
 
-    if excess(0.0) > 0.0:
+    if margin.grows(signs_at(0.0)):
         return 0.0
     highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
-    for low, high in pairwise(np.linspace(0.0, highest, FRICTIONS).tolist()):
-        if excess(high) > 0.0:
-            return bracketed_root(excess, low, high, absolute=_LOCATED)
-    return None
+    frictions = np.linspace(0.0, highest, FRICTIONS).tolist()
+    return next((each.value for each in margin.changes(signs_at, frictions, _LOCATED) if each.lost), None)
 
 
 def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:

@@ -1,0 +1,163 @@
+"""Where along a number steady sliding loses its stability, or has it again: one search for whoever asks.
+
+A margin says at each value what is positive where sliding is stable, with the rounding of each: the conditions of
+Routh and Hurwitz, the load that is left on the contact, or how far a scheme's factor is below one.
+"""
+
+import math
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+from brakecli.analysis.stability.certain import EPSILON, Rounded
+from brakecli.analysis.stability.search import bisect
+from brakecli.solver.roots import bracketed_root
+
+Margin = Callable[[float], Sequence[Rounded] | None]
+"""What is positive where sliding is stable; None where there is no steady sliding."""
+
+DIVERGENCE = 0
+FLUTTER = 1
+"""Places of both conditions in a margin."""
+_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `located`
+_CLOSE = 4.0  # units of rounding beside a root, where the sides of a change are asked first
+_WIDER = 8.0  # by which that becomes more
+_SEARCHES = 30  # steps of the search for an extreme
+_GOLDEN = 0.3819660112501051
+
+
+class Change(NamedTuple):
+    """A value at which stability is lost as it grows, or regained.
+
+    Beyond the error its side is sure, whatever rounding does. `which` of the margin passes zero; None where steady
+    sliding itself ends.
+    """
+
+    value: float
+    error: float
+    lost: bool
+    which: int | None
+
+
+def grows(signs: Sequence[Rounded] | None) -> bool:
+    """Whether disturbances surely grow, or there is no steady sliding."""
+    return signs is None or any(each.negative for each in signs)
+
+
+def changes(margin: Margin, values: Sequence[float], width: float = 0.0) -> list[Change]:
+    """Every change of stability along rising values, each in a bracket of a width."""
+    return between(margin, places(margin, values), width)
+
+
+def places(margin: Margin, values: Sequence[float]) -> list[float]:
+    """The values, and those between where something that keeps its sign is nearest to zero, or beyond it."""
+    return sorted({*values, *_extremes(margin, values)})
+
+
+def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> list[Change]:
+    """The changes between neighbours of rising values, each in a bracket of a width."""
+    sides = [(value, grows(margin(value))) for value in values]
+    return [
+        located(margin, low, high, width)
+        for (low, before), (high, after) in pairwise(sides)
+        if before is not after
+    ]
+
+
+def located(margin: Margin, low: float, high: float, width: float = 0.0) -> Change:
+    """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does."""
+    lower = low
+    upper = high
+    lost = grows(margin(high))
+    low, high = _narrowed(margin, low, high, lost, width)
+    low, high = bisect(lambda value: grows(margin(value)) is not lost, low, high, width=width)
+    stable, bound = (low, lower) if lost else (high, upper)
+    passing = _negative(margin(high if lost else low))
+
+    def hidden(value: float) -> bool:
+        """Whether rounding may hide what passes zero; where steady sliding ends that may be anything.
+
+        It was not surely negative at the end of the bracket: there its true value is above -2 errors, and rounding
+        alone takes none nearby below -4.
+        """
+        signs = [each for k, each in enumerate(margin(value) or ()) if k in passing or not passing]
+        return any(-_HIDDEN * each.error <= each.value <= each.error for each in signs)
+
+    stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
+    while hidden(stable) and stable != bound:
+        stable = (max if lost else min)(stable + stride, bound)
+        stride = 2.0 * stride
+    low, high = (stable, high) if lost else (low, stable)
+    return Change(0.5 * (low + high), 0.5 * (high - low), lost, passing[0] if passing else None)
+
+
+def _negative(signs: Sequence[Rounded] | None) -> list[int]:
+    return [k for k, each in enumerate(signs or ()) if each.negative]
+
+
+def _narrowed(margin: Margin, low: float, high: float, lost: bool, width: float) -> tuple[float, float]:
+    """A bracket about the root of what passes zero, so that few halvings are left."""
+    unstable = margin(high if lost else low)
+    passing = _negative(unstable)
+    if unstable is None or not passing or margin(low if lost else high) is None:
+        return low, high
+
+    def least(value: float) -> float:
+        signs = margin(value)
+        return -1.0 if signs is None else min(-signs[k].value / unstable[k].value for k in passing)
+
+    if not least(low) * least(high) < 0.0:
+        return low, high
+    root = bracketed_root(least, low, high, absolute=width)
+    apart = max(width, _CLOSE * EPSILON * abs(root))
+    while apart < high - low:
+        left = max(low, root - apart)
+        right = min(high, root + apart)
+        if grows(margin(left)) is not lost and grows(margin(right)) is lost:
+            return left, right
+        apart = _WIDER * apart
+    return low, high
+
+
+def _extremes(margin: Margin, values: Sequence[float]) -> list[float]:
+    """Where something that keeps its sign between three values is nearest to zero, or beyond it."""
+    found = list[float]()
+    for low, middle, high in zip(values, values[1:], values[2:], strict=False):
+        around = [margin(value) for value in (low, middle, high)]
+        if any(signs is None for signs in around):
+            continue
+        for which, (a, b, c) in enumerate(zip(*around, strict=True)):
+            sign = math.copysign(1.0, b.value)
+            alike = sign == math.copysign(1.0, a.value) == math.copysign(1.0, c.value)
+            if alike and abs(b.value) < min(abs(a.value), abs(c.value)):
+                found.append(_extreme(margin, which, sign, low, high))
+    return found
+
+
+def _extreme(margin: Margin, which: int, sign: float, left: float, right: float) -> float:
+    """The value between two at which something is nearest to zero, or beyond it; by the golden section."""
+
+    def height(value: float) -> float:
+        signs = margin(value)
+        return sign * signs[which].value if signs is not None else math.inf
+
+    a = left + _GOLDEN * (right - left)
+    b = right - _GOLDEN * (right - left)
+    at_a = height(a)
+    at_b = height(b)
+    for _ in range(_SEARCHES):
+        if min(at_a, at_b) < 0.0:
+            break
+        if at_a < at_b:
+            right = b
+            b = a
+            at_b = at_a
+            a = left + _GOLDEN * (right - left)
+            at_a = height(a)
+        else:
+            left = a
+            a = b
+            at_a = at_b
+            b = right - _GOLDEN * (right - left)
+            at_b = height(b)
+    return a if at_a < at_b else b

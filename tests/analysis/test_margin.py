@@ -1,0 +1,84 @@
+"""Where a margin passes zero: polynomials with known roots, rounding, and values at which there is none."""
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.margin import Change, Margin, changes
+from brakecli.analysis.stability.certain import Rounded
+
+VALUES = np.linspace(0.0, 1.0, 17).tolist()
+
+
+def of(*terms: Sequence[float], error: float = 1e-15) -> Margin:
+    """A margin of products of (x - root)."""
+
+    def signs(x: float) -> list[Rounded]:
+        return [Rounded(math.prod(x - root for root in roots), error) for roots in terms]
+
+    return signs
+
+
+def told(margin: Margin) -> list[tuple[float, bool, int | None]]:
+    found = changes(margin, VALUES)
+    for each in found:
+        assert 0.0 < each.error < 1e-9
+    return [(each.value, each.lost, each.which) for each in found]
+
+
+def test_each_root_is_a_change_and_its_place_says_what_passes() -> None:
+    assert told(of((0.3, 0.7))) == [
+        (pytest.approx(0.3, abs=1e-14), True, 0),
+        (pytest.approx(0.7, abs=1e-14), False, 0),
+    ]
+    assert told(of((-1.0,), (0.2,), (0.9, 0.4))) == [
+        (pytest.approx(0.2, abs=1e-14), False, 1),
+        (pytest.approx(0.4, abs=1e-14), True, 2),
+        (pytest.approx(0.9, abs=1e-14), False, 2),
+    ]
+
+
+def test_a_window_between_two_values_is_found() -> None:
+    """It is a thousandth of a step wide; where it begins its slope is 6e-5, so that 1e-15 is 1.7e-11 of the value."""
+    low = 0.51
+    found = changes(of((low, low + 6e-5)), VALUES)
+    assert [each.value for each in found] == pytest.approx([low, low + 6e-5], abs=1.7e-11)
+    assert max(each.error for each in found) < 6.8e-11
+
+
+def test_beyond_its_error_the_side_of_a_change_is_sure() -> None:
+    """Of x - 1/3 with an error of 1e-6 the sign is sure beyond 1e-6, and the bracket some times as wide."""
+    margin = of((1 / 3,), error=1e-6)
+    (found,) = changes(margin, VALUES)
+    assert abs(found.value - 1 / 3) <= found.error
+    assert 1e-6 <= found.error <= 2e-5
+
+
+def test_where_sliding_ends_nothing_passes_zero() -> None:
+    def ends(x: float) -> list[Rounded] | None:
+        return [Rounded(1.0)] if x < 0.35 else None
+
+    (found,) = changes(ends, VALUES, 1e-9)
+    assert found == Change(pytest.approx(0.35, abs=1e-9), found.error, True, None)
+    assert found.error <= 1e-9
+
+
+def test_a_margin_that_ends_beyond_its_root_has_the_root() -> None:
+    def ends(x: float) -> list[Rounded] | None:
+        return [Rounded(0.36 - x, 1e-16)] if x < 0.37 else None
+
+    (found,) = changes(ends, VALUES)
+    assert (found.value, found.which) == (pytest.approx(0.36, abs=1e-14), 0)
+
+
+def test_the_golden_section_finds_the_least_of_what_keeps_its_sign() -> None:
+    asked = list[float]()
+
+    def above(x: float) -> list[Rounded]:
+        asked.append(x)
+        return [Rounded((x - 0.6180) ** 2 + 1e-12, 1e-16)]
+
+    assert changes(above, VALUES) == []
+    assert min(abs(x - 0.6180) for x in asked) < 1e-6
