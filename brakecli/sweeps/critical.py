@@ -5,18 +5,17 @@ off the branch of the motion that the waves force (`branches`); where their wave
 exponent is measured instead.
 """
 
-import math
 from collections.abc import Callable
 from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.margin import Margin, between, changes, grows
+from brakecli.analysis.margin import Margin, changes, grows
 from brakecli.analysis.stability.certain import Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.analysis.stability.report import MARGIN, stability
+from brakecli.analysis.stability.report import MARGIN
 from brakecli.branches.answers import Answers
 from brakecli.branches.line import Line
 from brakecli.case.case import Case
@@ -40,10 +39,7 @@ def search(critical: Critical, line: Line) -> Search:
     """Look for the critical value of the parameter along a line of cases."""
     case_at = cache(line.case_with)
     steady_at = cache(partial(_steady, case_at))
-    if critical.parameter == "friction.coefficient":
-        exact = _friction_by_eigenvalues(critical, case_at(critical.lower))
-    else:
-        exact = _by_eigenvalues(critical, case_at, steady_at)
+    exact = _by_eigenvalues(critical, case_at, steady_at)
     if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
     case = case_at(critical.lower)
@@ -139,32 +135,3 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
     own = searched(in_steps, SCANNED_WHERE_OPEN, middles)
     same = own.value is not None and exact.value is not None and exact.outcome is own.outcome
     return exact._replace(bias=own.value - exact.value) if same else exact  # type: ignore[operator]
-
-
-def _friction_by_eigenvalues(critical: Critical, case: Case) -> Search:
-    """The first loss of stability within the range of φ, otherwise the first regain."""
-    system = system_of(case)
-    report = stability(system)
-    links = links_of(case)
-
-    @cache
-    def signs_at(phi: float) -> list[Rounded] | None:
-        k = report.stiffness_at(phi)
-        return conditions(links, k, math.copysign(phi, report.belt_speed)) if math.isfinite(k) else None
-
-    within = [each.friction for each in report.crossings if critical.lower <= each.friction <= critical.upper]
-    ends = [critical.lower, *within, critical.upper]
-    middles = [0.5 * (low + high) for low, high in pairwise(ends)]
-    edges = list[Edge]()
-    for change in between(signs_at, middles):
-        phi = min(within, key=lambda each: abs(each - change.value))
-        edges.append(Edge(phi, abs(phi - change.value) + change.error))
-    unstable = grows(signs_at(middles[0])) if edges else not report.stable
-    held = system.coefficients.c_xx > 0.0  # otherwise there is steady sliding without friction only
-    if not edges and (report.stable is None or report.belt_speed == 0.0 or not held):
-        return Search(Outcome.NO_SLIDING)
-    found = of_edges(critical, unstable, edges)
-    if found.value is None:
-        return found
-    lost = report.critical is not None and found.value == report.critical.friction
-    return found._replace(eigenvalue=found.value, bias=report.discrete.bias if report.discrete and lost else None)
