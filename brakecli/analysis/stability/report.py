@@ -8,7 +8,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis import margin
+from brakecli.analysis.margin import FLUTTER, Margin, grows, located
+from brakecli.analysis.margin import changes as margin_changes
 from brakecli.analysis.stability.certain import Rounded, conditions, links_with
 from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
 from brakecli.analysis.stability.modes import (
@@ -16,7 +17,6 @@ from brakecli.analysis.stability.modes import (
     Mode,
     crossings,
     eigensystem,
-    growth,
     modes,
 )
 from brakecli.analysis.stability.search import bisect
@@ -43,7 +43,6 @@ NEAREST = 1e-9
 WIDER = 4.0
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
-_GROWS = 1e-9  # growth (1/s) over the highest natural frequency (Hz), below which it is rounding
 _LOCATED = 1e-12  # bracket of the friction at which a scheme loses stability
 _STEP_HALVINGS = 60  # of the same for a step in time
 
@@ -113,7 +112,7 @@ def stability(system: System) -> StabilityReport:
         equilibrium=rest,
         no_equilibrium=reason,
         contact_stiffness=k,
-        stable=not margin.grows(conditions(links_with(c), k, grip)) if rest else None,
+        stable=not grows(conditions(links_with(c), k, grip)) if rest else None,
         eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
         crossings=tuple(found),
@@ -149,8 +148,7 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
     k = stiffness_at(c.phi)
     if not k > 0.0:
         return None
-    grows = growth(c, k, c.grip(system.belt_speed)) > _GROWS * natural_frequencies(c, k)[1]
-    return 0.0 if grows else None
+    return 0.0 if grows(conditions(links_with(c), k, c.grip(system.belt_speed))) else None
 
 
 def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | None, float | None]:
@@ -165,14 +163,14 @@ def undamped_critical(c: Coefficients, k: float, belt: float) -> tuple[float | N
     return None, (c.c_xx * (c.c_yy + k) - c.c_xy**2) / (k * abs(c.c_xy))
 
 
-def mean_stiffness(system: System, smooth: float) -> StiffnessAt:
+def mean_stiffness(system: System, smooth: float, mean: Mean | None = None) -> StiffnessAt:
     """Mean stiffness of a rough contact as it depends on φ through the mean force; NaN where there is none.
 
     That of smooth surfaces (N/m) is known. Of a wheel at rest, and of a shoe that no link holds, it is not needed.
     """
     if system.smooth or system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
         return lambda phi: smooth
-    mean = tabulated(system)
+    mean = mean or tabulated(system)
 
     @cache
     def at(phi: float) -> float:
@@ -187,6 +185,18 @@ def _spread(values: list[float]) -> float:
     return SURE * float(np.std(values, ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
 
 
+def _along_friction(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> Margin:
+    """The margin of steady sliding along φ."""
+    links = links_with(c)
+
+    @cache
+    def signs_at(phi: float) -> list[Rounded] | None:
+        k = stiffness_at(phi)
+        return conditions(links, k, math.copysign(phi, belt)) if math.isfinite(k) else None
+
+    return signs_at
+
+
 def _critical_error(system: System, critical: Crossing, means: list[Mean]) -> float | None:
     """By which the mean over the waves leaves a critical friction open: where single windows would have it."""
     c = system.coefficients
@@ -197,20 +207,14 @@ def _critical_error(system: System, critical: Crossing, means: list[Mean]) -> fl
         return 0.0
     found = list[float]()
     for mean in means:
-
-        def stable(phi: float, mean: Mean = mean) -> bool:
-            rest = sliding(system, mean, phi)
-            if rest is None or not rest.is_pressed(system.load_at_start):
-                return False
-            return not modes(c._replace(phi=phi), rest.stiffness, math.copysign(phi, belt))[0].growth > 0.0
-
+        signs_at = _along_friction(c, belt, mean_stiffness(system, math.nan, mean))
         away = NEAREST
-        while stable(friction + away) or not stable(max(friction - away, 0.0)):
+        while not grows(signs_at(friction + away)) or grows(signs_at(max(friction - away, 0.0))):
             away *= WIDER
             if away > FRICTION_STEP:
                 return None
-        low, high = bisect(stable, max(friction - away, 0.0), friction + away, width=NEAREST * away)
-        found.append(0.5 * (low + high))
+        low = max(friction - away, 0.0)
+        found.append(located(signs_at, low, friction + away, NEAREST * away).value)
     return _spread(found)
 
 
@@ -222,17 +226,11 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up
     """
     if c.c_xx == 0.0:
         return []
-
-    @cache
-    def signs_at(phi: float) -> list[Rounded] | None:
-        k = stiffness_at(phi)
-        return conditions(links_with(c), k, math.copysign(phi, belt)) if math.isfinite(k) else None
-
     found = []
-    frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1)
-    for change in margin.changes(signs_at, frictions.tolist()):
+    frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1).tolist()
+    for change in margin_changes(_along_friction(c, belt, stiffness_at), frictions):
         phi = change.value
-        if change.which == margin.FLUTTER:
+        if change.which == FLUTTER:
             frequency = modes(c._replace(phi=phi), stiffness_at(phi), math.copysign(phi, belt))[0].frequency
             found.append(Crossing(phi, "flutter", frequency, change.lost))
         elif change.which is not None or change.lost:
@@ -266,11 +264,11 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
     def signs_at(phi: float) -> list[Rounded]:
         return [Rounded(1.0 + MARGIN - spectral_radius(system, stiffness_at(phi), phi))]
 
-    if margin.grows(signs_at(0.0)):
+    if grows(signs_at(0.0)):
         return 0.0
     highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
     frictions = np.linspace(0.0, highest, FRICTIONS).tolist()
-    return next((each.value for each in margin.changes(signs_at, frictions, _LOCATED) if each.lost), None)
+    return next((each.value for each in margin_changes(signs_at, frictions, _LOCATED) if each.lost), None)
 
 
 def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
