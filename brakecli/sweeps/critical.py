@@ -21,7 +21,7 @@ from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import SteadySliding, steady_sliding
+from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 from brakecli.sweeps.lyapunov import Steady, by_exponents
 from brakecli.sweeps.read_off import PART, explored, on_waves
@@ -31,6 +31,7 @@ from brakecli.sweeps.windows import Edge, Outcome, Search, of_edges
 
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
+_OF_SURFACES = ("contact.half_length", "contact.nodes", "contact.evaluator", "roughness.")
 _OPENS = 0.999  # part of the stiffness of the whole pad, below which it opens
 _FINEST = 1e-9  # bracket of a change over the requested one, where evaluations are cheap
 
@@ -38,7 +39,7 @@ _FINEST = 1e-9  # bracket of a change over the requested one, where evaluations 
 def search(critical: Critical, line: Line) -> Search:
     """Look for the critical value of the parameter along a line of cases."""
     case_at = cache(line.case_with)
-    steady_at = cache(partial(_steady, case_at))
+    steady_at = cache(partial(_steady, case_at, not critical.parameter.startswith(_OF_SURFACES)))
     exact = _by_eigenvalues(critical, case_at, steady_at)
     if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
@@ -74,13 +75,16 @@ def search(critical: Critical, line: Line) -> Search:
     )
 
 
-def _steady(case_at: Callable[[float], Case], value: float) -> tuple[System, SteadySliding] | None:
-    """Steady sliding at a value; None where the wheel does not turn, and no load, or no link, holds the shoe."""
+def _steady(case_at: Callable[[float], Case], alike: bool, value: float) -> tuple[System, SteadySliding] | None:
+    """Steady sliding at a value; None where the wheel does not turn, and no load, or no link, holds the shoe.
+
+    Where the surfaces are `alike` at all values, they share a table of the mean contact.
+    """
     try:
         system = system_of(case_at(value))
         if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
             return None
-        rest = steady_sliding(system)
+        rest = steady_sliding(system, mean=tabulated(system) if alike else None)
     except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
         return None
     return (system, rest) if rest.is_pressed(system.load_at_start) else None
