@@ -102,7 +102,7 @@ def followed(
     line = Line(make(tables), [key], low, high)
     sliding = Sliding(line)
     cycles = Cycles(line)
-    flutters = [change for change in sliding.changes(sliding.along(33)) if change.kind == "flutter"]
+    flutters = [change for change in sliding.changes(sliding.along()) if change.kind == "flutter"]
     if len(flutters) <= which:
         return None
     first = sliding.vibration(cycles, flutters[which])
