@@ -8,11 +8,16 @@ import pytest
 import tomli_w
 
 import brakecli
+from brakecli.analysis.stability.report import stability
+from brakecli.branches.line import Line
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.scattering.eigen import answer_of
+from brakecli.sweeps.critical import search
+from brakecli.sweeps.tables import Critical
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
+from tests.examples import make
 
 DIGITS = 5e-7
 """Part of a critical value that seven digits do not show: more than any command prints."""
@@ -37,3 +42,23 @@ def test_all_commands_have_the_same_critical_friction(number: int, tmp_path: Pat
         }
         for name, answer in answers.items():
             assert answer == pytest.approx(value, rel=DIGITS), (place, name)
+
+
+def test_a_rough_shoe_has_the_same_critical_friction_and_bar_in_a_sweep() -> None:
+    """By the mean stiffness of an open pad, with what the mean leaves open; a search adds half its bracket."""
+    for place, tables in enumerate(islice(random_shoes("open", 11), 9, 16)):
+        case = make(tables)
+        told = stability(system_of(case))
+        if told.critical is None or told.critical_error is None:
+            continue
+        value = told.critical.friction
+        critical = Critical(
+            parameter="friction.coefficient",
+            lower=0.0,
+            upper=2.0 * value,
+            method="eigenvalue",
+            tolerance=1e-6 * value,
+        )
+        found = search(critical, Line(case, [critical.parameter], critical.lower, critical.upper))
+        assert found.value == pytest.approx(value, rel=DIGITS), place
+        assert found.error == pytest.approx(told.critical_error, rel=0.1, abs=1e-8 * value), place

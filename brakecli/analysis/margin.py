@@ -5,7 +5,8 @@ Routh and Hurwitz, the load that is left on the contact, or how far a scheme's f
 """
 
 import math
-from collections.abc import Callable, Sequence
+import statistics
+from collections.abc import Callable, Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -19,6 +20,8 @@ Margin = Callable[[float], Sequence[Rounded] | None]
 DIVERGENCE = 0
 FLUTTER = 1
 """Places of both conditions in a margin."""
+SURE = 3.0
+"""Standard errors of the mean of windows of the waves that a bar holds; a choice."""
 _HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `located`
 _CLOSE = 4.0  # units of rounding beside a root, where the sides of a change are asked first
 _WIDER = 8.0  # by which that becomes more
@@ -44,7 +47,7 @@ def grows(signs: Sequence[Rounded] | None) -> bool:
     return signs is None or any(each.negative for each in signs)
 
 
-def changes(margin: Margin, values: Sequence[float], width: float = 0.0) -> list[Change]:
+def changes(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iterator[Change]:
     """Every change of stability along rising values, each in a bracket of a width."""
     return between(margin, places(margin, values), width)
 
@@ -54,14 +57,14 @@ def places(margin: Margin, values: Sequence[float]) -> list[float]:
     return sorted({*values, *_extremes(margin, values)})
 
 
-def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> list[Change]:
-    """The changes between neighbours of rising values, each in a bracket of a width."""
-    sides = [(value, grows(margin(value))) for value in values]
-    return [
-        located(margin, low, high, width)
-        for (low, before), (high, after) in pairwise(sides)
-        if before is not after
-    ]
+def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iterator[Change]:
+    """The changes between neighbours of rising values, each in a bracket of a width; beyond the last that is
+    taken nothing is asked.
+    """
+    sides = ((value, grows(margin(value))) for value in values)
+    for (low, before), (high, after) in pairwise(sides):
+        if before is not after:
+            yield located(margin, low, high, width)
 
 
 def located(margin: Margin, low: float, high: float, width: float = 0.0) -> Change:
@@ -89,6 +92,24 @@ def located(margin: Margin, low: float, high: float, width: float = 0.0) -> Chan
         stride = 2.0 * stride
     low, high = (stable, high) if lost else (low, stable)
     return Change(0.5 * (low + high), 0.5 * (high - low), lost, passing[0] if passing else None)
+
+
+def left_open(
+    margin: Margin, windows: Sequence[Margin], summed: Margin, change: Change, near: float
+) -> float | None:
+    """How far a change may lie off, as the mean contact over the waves is interpolated, and over few waves.
+
+    `windows`: the margin by each stretch of the waves alone; `summed`: by a mean that is not interpolated. One
+    that is higher by δ passes zero by δ over the slope farther on. They are asked at a stable value `near` it,
+    where the slope is the margin over the distance. None where one of them has no steady sliding there, and where
+    steady sliding itself ends.
+    """
+    signs = [each(near) for each in (margin, summed, *windows)]
+    if change.which is None or change.value == near or any(each is None for each in signs):
+        return None
+    here, exact, *others = (each[change.which].value for each in signs if each is not None)
+    off = abs(exact - here) + SURE * statistics.stdev(others) / math.sqrt(len(others))
+    return off * abs(change.value - near) / abs(here) if off else 0.0
 
 
 def _negative(signs: Sequence[Rounded] | None) -> list[int]:

@@ -11,7 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.margin import Margin, changes, grows
+from brakecli.analysis.margin import Change, Margin, between, grows, left_open, places
 from brakecli.analysis.stability.certain import Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
 from brakecli.analysis.stability.modes import is_undamped
@@ -21,7 +21,7 @@ from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import SteadySliding, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import PRESSED, WINDOWS, Mean, SteadySliding, steady_sliding, tabulated
 from brakecli.solver.system import System
 from brakecli.sweeps.lyapunov import Steady, by_exponents
 from brakecli.sweeps.read_off import PART, explored, on_waves
@@ -32,6 +32,7 @@ from brakecli.sweeps.windows import Edge, Outcome, Search, of_edges
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 _OF_SURFACES = ("contact.half_length", "contact.nodes", "contact.evaluator", "roughness.")
+_NEAR = 1e-3  # of the range, by which a stable value lies beside a change that tells its error; a choice
 _OPENS = 0.999  # part of the stiffness of the whole pad, below which it opens
 _FINEST = 1e-9  # bracket of a change over the requested one, where evaluations are cheap
 
@@ -39,8 +40,14 @@ _FINEST = 1e-9  # bracket of a change over the requested one, where evaluations 
 def search(critical: Critical, line: Line) -> Search:
     """Look for the critical value of the parameter along a line of cases."""
     case_at = cache(line.case_with)
-    steady_at = cache(partial(_steady, case_at, not critical.parameter.startswith(_OF_SURFACES)))
-    exact = _by_eigenvalues(critical, case_at, steady_at)
+    alike = not critical.parameter.startswith(_OF_SURFACES)  # so that all values share a table of the mean contact
+    rest_at = cache(partial(_steady, case_at, tabulated if alike else None))
+
+    def steady_at(value: float) -> tuple[System, SteadySliding] | None:
+        found = rest_at(value)
+        return found if found and found[1].is_pressed(found[0].load_at_start) else None
+
+    exact = _by_eigenvalues(critical, case_at, rest_at, steady_at)
     if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
     case = case_at(critical.lower)
@@ -75,26 +82,28 @@ def search(critical: Critical, line: Line) -> Search:
     )
 
 
-def _steady(case_at: Callable[[float], Case], alike: bool, value: float) -> tuple[System, SteadySliding] | None:
-    """Steady sliding at a value; None where the wheel does not turn, and no load, or no link, holds the shoe.
+def _steady(
+    case_at: Callable[[float], Case], mean: Callable[[System], Mean] | None, value: float
+) -> tuple[System, SteadySliding] | None:
+    """Steady sliding at a value, by the mean contact of a system; by its places where there is no other.
 
-    Where the surfaces are `alike` at all values, they share a table of the mean contact.
+    None where the wheel does not turn, or no link holds the shoe. It need not be pressed on the wheel.
     """
     try:
         system = system_of(case_at(value))
         if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
             return None
-        rest = steady_sliding(system, mean=tabulated(system) if alike else None)
+        return system, steady_sliding(system, mean=mean(system) if mean else None)
     except CaseError:  # no equilibrium, or a value that no case can have, between two that it can
         return None
-    return (system, rest) if rest.is_pressed(system.load_at_start) else None
 
 
-def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady_at: Steady) -> Search:
+def _by_eigenvalues(
+    critical: Critical, case_at: Callable[[float], Case], rest_at: Steady, steady_at: Steady
+) -> Search:
     """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
 
-    @cache
-    def signs_at(value: float) -> list[Rounded] | None:
+    def by(steady: Steady, value: float) -> list[Rounded] | None:
         try:
             system = system_of(case_at(value))
             links = links_of(case_at(value))
@@ -102,11 +111,16 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
             return None
         grip = system.coefficients.grip(system.belt_speed)
         if not system.smooth:
-            return conditions(links, found[1].stiffness, grip) if (found := steady_at(value)) else None
+            if (found := steady(value)) is None:
+                return None
+            force = found[1].normal_force - PRESSED * abs(system.load_at_start)
+            return [*conditions(links, found[1].stiffness, grip), Rounded(force)]
         if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
             return None
         pressed = links.pressed * Rounded(system.load_at_start)
         return [*conditions(links, system.contact_stiffness, grip), pressed]
+
+    signs_at = cache(partial(by, rest_at))
 
     @cache
     def in_steps(value: float) -> list[Rounded] | None:
@@ -119,15 +133,31 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
     opens = first is not None and first[1].stiffness < _OPENS * first[0].contact_stiffness
     width = critical.tolerance * (PART if opens else _FINEST)
 
-    def searched(margin: Margin, count: int, middles: list[float]) -> Search:
-        values = sorted({*np.linspace(critical.lower, critical.upper, count).tolist(), *middles})
+    def scanned(count: int) -> list[float]:
+        values: list[float] = np.linspace(critical.lower, critical.upper, count).tolist()
+        return values
+
+    def off(change: Change) -> float:
+        """By which the mean over the waves leaves a change open, as far as there is steady sliding."""
+        if system_of(case_at(change.value)).smooth:
+            return 0.0
+        apart = _NEAR * (critical.upper - critical.lower)
+        near = change.value - apart if change.lost else change.value + apart
+        near = min(max(near, critical.lower), critical.upper)
+        windows = [partial(by, partial(_steady, case_at, partial(tabulated, window=k))) for k in range(WINDOWS)]
+        return left_open(signs_at, windows, partial(by, partial(_steady, case_at, None)), change, near) or 0.0
+
+    def searched(margin: Margin, values: list[float]) -> Search:
         if all(steady_at(value) is None for value in values):
             return Search(Outcome.NO_SLIDING)
-        edges = [Edge(each.value, each.error) for each in changes(margin, values, width)]
+        edges = [
+            Edge(each.value, each.error + (off(each) if margin is signs_at else 0.0))
+            for each in between(margin, values, width)
+        ]
         return of_edges(critical, grows(margin(critical.lower)), edges)
 
-    scanned = SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES
-    exact = searched(signs_at, scanned, [])
+    values = scanned(SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
+    exact = searched(signs_at, places(signs_at, values))
     exact = exact._replace(eigenvalue=exact.value)
     beside = exact.value and (steady_at(exact.lower) or steady_at(exact.upper))
     if not beside or beside[0].method.own_steps:
@@ -136,6 +166,6 @@ def _by_eigenvalues(critical: Critical, case_at: Callable[[float], Case], steady
         return exact
     ends = [critical.lower, *(end for window in exact.windows for end in window), critical.upper]
     middles = [0.5 * (low + high) for low, high in pairwise(ends)]
-    own = searched(in_steps, SCANNED_WHERE_OPEN, middles)
+    own = searched(in_steps, sorted({*scanned(SCANNED_WHERE_OPEN), *middles}))
     same = own.value is not None and exact.value is not None and exact.outcome is own.outcome
     return exact._replace(bias=own.value - exact.value) if same else exact  # type: ignore[operator]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from brakecli.analysis.margin import Margin, changes
+from brakecli.analysis.margin import Change, Margin, changes, left_open
 from brakecli.analysis.stability.certain import Rounded
 
 VALUES = np.linspace(0.0, 1.0, 17).tolist()
@@ -31,7 +31,7 @@ def of(*terms: Sequence[float], error: float = 1e-15) -> Margin:
 def test_each_root_is_a_change_and_its_place_says_what_passes(
     terms: list[tuple[float, ...]], values: list[float], sides: list[tuple[bool, int]]
 ) -> None:
-    found = changes(of(*terms), VALUES)
+    found = list(changes(of(*terms), VALUES))
     assert [each.value for each in found] == pytest.approx(values, abs=1e-14)
     assert [(each.lost, each.which) for each in found] == sides
     assert all(0.0 < each.error < 1e-13 for each in found)
@@ -40,7 +40,7 @@ def test_each_root_is_a_change_and_its_place_says_what_passes(
 def test_a_window_between_two_values_is_found() -> None:
     """It is a thousandth of a step wide. Its slope is 6e-5 where it begins: 1e-15 are 1.7e-11 of the value."""
     low = 0.51
-    found = changes(of((low, low + 6e-5)), VALUES)
+    found = list(changes(of((low, low + 6e-5)), VALUES))
     assert [each.value for each in found] == pytest.approx([low, low + 6e-5], abs=1.7e-11)
     assert max(each.error for each in found) < 6.8e-11
 
@@ -79,5 +79,21 @@ def test_the_golden_section_finds_the_least_of_what_keeps_its_sign() -> None:
         asked.append(x)
         return [Rounded((x - 0.6180) ** 2 + 1e-12, 1e-16)]
 
-    assert changes(above, VALUES) == []
+    assert list(changes(above, VALUES)) == []
     assert min(abs(x - 0.6180) for x in asked) < 1e-6
+
+
+def test_what_a_mean_leaves_open_moves_the_root_of_a_line() -> None:
+    """Of 5 (0.4 - x): windows at roots 0.4 ± 0.01 have a mean whose error is 3 · 0.01 · √(4/3) / √4."""
+
+    def line(root: float) -> Margin:
+        return lambda x: [Rounded(1.0), Rounded(5.0 * (root - x))]
+
+    windows = [line(0.39), line(0.41), line(0.39), line(0.41)]
+    change = Change(0.4, 0.0, True, 1)
+    spread = 3.0 * 0.01 * math.sqrt(4.0 / 3.0) / 2.0
+    assert left_open(line(0.4), windows, line(0.4), change, 0.35) == pytest.approx(spread, rel=1e-12)
+    assert left_open(line(0.4), windows, line(0.402), change, 0.35) == pytest.approx(spread + 0.002, rel=1e-12)
+    assert left_open(line(0.4), [line(0.4)] * 4, line(0.4), change, 0.35) == 0.0
+    assert left_open(line(0.4), [lambda x: None], line(0.4), change, 0.35) is None
+    assert left_open(line(0.4), windows, line(0.4), change._replace(which=None), 0.35) is None

@@ -1,6 +1,7 @@
 """Error bars of what eigenvalues say on smooth pads, held against fifty digits."""
 
 import math
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,10 @@ from brakecli.analysis.stability.certain import Rounded, conditions, links_of
 from brakecli.analysis.stability.modes import modes
 from brakecli.branches.line import Line
 from brakecli.case.system import system_of
-from brakecli.sweeps.critical import search
+from brakecli.sweeps.critical import SCANNED_BY_EIGENVALUES, search
 from brakecli.sweeps.tables import Critical
 from brakecli.sweeps.windows import Outcome, Search
+from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
 from tests.examples import make
 from tests.sweeps.independent import Tables, held_by, mpmath, smooth_is_unstable
@@ -213,3 +215,21 @@ def test_a_search_may_begin_where_there_is_no_steady_sliding() -> None:
     found = answer(tables, "link2__angle_deg", -60.0, -5.0, method="eigenvalue")
     assert (found.outcome, found.bias) == (Outcome.REGAINED, 0.0)
     assert held_and_bars(found, tables, "link2__angle_deg", -60.0, -5.0)[0] == [True]
+
+
+@pytest.mark.parametrize(
+    ("place", "key", "low", "high"), [(94, "link2", -4.25, -4.24), (118, "link1", -13.0, -12.0)]
+)
+def test_a_window_between_two_of_the_values_that_are_looked_at_is_found(
+    place: int, key: str, low: float, high: float
+) -> None:
+    """Of 129 values between -85° and 85°, or -60° and 60°, none lies in it."""
+    tables = next(islice(random_shoes("smooth", 11), place, None))
+    key = f"{key}__angle_deg"
+    found = answer(tables, key, *RANGES[key], method="eigenvalue", tolerance=1e-3)
+    begin, end = found.windows[0]
+    assert low < begin < end < high
+    values = np.linspace(*RANGES[key], SCANNED_BY_EIGENVALUES)
+    assert not any((begin <= values) & (values <= end))
+    sides = [unstable(at(tables, key, value)) for value in (begin - 1e-9, begin + 1e-9, end - 1e-9, end + 1e-9)]
+    assert sides == [False, True, True, False]

@@ -3,12 +3,12 @@
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.margin import FLUTTER, Margin, grows, located
+from brakecli.analysis.margin import DIVERGENCE, FLUTTER, SURE, Change, Margin, between, grows, left_open
 from brakecli.analysis.margin import changes as margin_changes
 from brakecli.analysis.stability.certain import Rounded, conditions, links_with
 from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
@@ -28,6 +28,7 @@ from brakecli.solver.steady_sliding import (
     WINDOWS,
     Mean,
     SteadySliding,
+    mean_contact,
     sliding,
     steady_sliding,
     tabulated,
@@ -37,13 +38,10 @@ from brakecli.solver.system import System
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
 FRICTION_STEP = 0.025
 FRICTIONS = 41  # values among which a scheme is asked where it loses stability, by 0.25 where nothing is known
-SURE = 3.0  # standard errors of the mean of the windows that a bar holds; a choice
-# half a bracket of friction in which a window is asked first, and by which it grows
-NEAREST = 1e-9
-WIDER = 4.0
+_NEAR = 1e-3  # of friction, by which a stable value lies below the critical one that tells its error; a choice
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
 _CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
-_LOCATED = 1e-12  # bracket of the friction at which a scheme loses stability
+_LOCATED = 1e-9  # bracket of the friction at which a scheme loses stability, as far as rounding moves that
 _STEP_HALVINGS = 60  # of the same for a step in time
 
 StiffnessAt = Callable[[float], float]
@@ -197,25 +195,21 @@ def _along_friction(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> 
     return signs_at
 
 
-def _critical_error(system: System, critical: Crossing, means: list[Mean]) -> float | None:
-    """By which the mean over the waves leaves a critical friction open: where single windows would have it."""
+def _critical_error(system: System, critical: Crossing, windows: list[Mean]) -> float | None:
+    """By which the mean over the waves leaves a critical friction open."""
     c = system.coefficients
     belt = system.belt_speed
-    friction = critical.friction
-    rests = [sliding(system, mean, friction) for mean in means]
-    if belt == 0.0 or c.c_xx == 0.0 or all(rest is not None and rest.contact_fraction == 1.0 for rest in rests):
+    if not windows or belt == 0.0 or c.c_xx == 0.0:
         return 0.0
-    found = list[float]()
-    for mean in means:
-        signs_at = _along_friction(c, belt, mean_stiffness(system, math.nan, mean))
-        away = NEAREST
-        while not grows(signs_at(friction + away)) or grows(signs_at(max(friction - away, 0.0))):
-            away *= WIDER
-            if away > FRICTION_STEP:
-                return None
-        low = max(friction - away, 0.0)
-        found.append(located(signs_at, low, friction + away, NEAREST * away).value)
-    return _spread(found)
+
+    def by(mean: Mean) -> Margin:
+        return _along_friction(c, belt, mean_stiffness(system, math.nan, mean))
+
+    which = FLUTTER if critical.instability == "flutter" else DIVERGENCE
+    change = Change(critical.friction, 0.0, True, which)
+    near = max(critical.friction - _NEAR, 0.0)
+    summed = by(partial(mean_contact, system))
+    return left_open(by(tabulated(system)), [by(mean) for mean in windows], summed, change, near)
 
 
 def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up_to: float) -> list[Crossing]:
@@ -268,7 +262,7 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
         return 0.0
     highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
     frictions = np.linspace(0.0, highest, FRICTIONS).tolist()
-    return next((each.value for each in margin_changes(signs_at, frictions, _LOCATED) if each.lost), None)
+    return next((each.value for each in between(signs_at, frictions, _LOCATED) if each.lost), None)
 
 
 def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
