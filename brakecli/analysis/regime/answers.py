@@ -163,9 +163,7 @@ class Answers(NamedTuple):
     def sticks(self) -> str:
         """How often the motion sticks."""
         return (
-            told("with stick in {a.stick_cycles:.0%} of the cycles", self)
-            if self.stick_cycles
-            else "without stick"
+            told("with stick in {stick_cycles:.0%} of the cycles", self) if self.stick_cycles else "without stick"
         )
 
     @property
@@ -178,14 +176,14 @@ class Answers(NamedTuple):
         """Where the energy of vx lies."""
         if not self.band_share <= self.harmonic_share and math.isfinite(self.band_share):
             return f"{self.band_share:.0%} of the energy of vx in three narrow bands"
-        return told("{a.harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
+        return told("{harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
 
     @property
     def limit(self) -> str:
         """What it comes to on the smooth wheel."""
         if not math.isfinite(self.amplitude_without_waves):
             return "no limit cycle that was found"
-        return told("an amplitude of {a.amplitude_without_waves:.4g} m[ in a cycle of {a.ends_at:.4g} Hz]", self)
+        return told("an amplitude of {amplitude_without_waves:.4g} m[ in a cycle of {ends_at:.4g} Hz]", self)
 
     @property
     def ends_at(self) -> float:

@@ -69,7 +69,14 @@ class UnknownNumberError(Exception):
 
 
 class _Known(Formatter):
-    """Writes what is known."""
+    """Writes what is known, by the names of answers."""
+
+    def __init__(self, answers: Any) -> None:
+        self.answers = answers
+
+    def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
+        """The answer of a name."""
+        return getattr(self.answers, str(key))
 
     def format_field(self, value: Any, format_spec: str) -> str:
         """A value in a sentence; raises UnknownNumberError for a number that is not finite."""
@@ -85,7 +92,7 @@ def told(text: str, answers: Any) -> str:
     """
     pieces = re.split(_OPTIONAL, text)
     pieces[1::2] = [_told_or_nothing(piece, answers) for piece in pieces[1::2]]
-    pieces[::2] = [_Known().format(piece, a=answers) for piece in pieces[::2]]
+    pieces[::2] = [_Known(answers).format(piece) for piece in pieces[::2]]
     return "".join(pieces)
 
 

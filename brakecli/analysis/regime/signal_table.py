@@ -77,100 +77,113 @@ class SignalAnswers:
         return f"give {argument('belt-speed')}" * self.has_belt
 
 
-def steady(change: float, error: float, t: SignalThresholds) -> bool:
+def steady(change: float, error: float, limits: SignalThresholds) -> bool:
     """Whether the level does not change, but for chance."""
-    return abs(change) <= max(t.sure_errors * error, 2.0 * t.negligible)
+    return abs(change) <= max(limits.sure_errors * error, 2.0 * limits.negligible)
 
 
-def _skewed(a: SignalAnswers, t: SignalThresholds) -> bool:
+def _skewed(motion: SignalAnswers, limits: SignalThresholds) -> bool:
     """What may be slips skews the velocity."""
-    some = a.slips or a.skewness < t.skewness_certain  # two lines in step may hide the shape of slips
-    return a.events >= t.fewest_cycles and a.skewness > 0.0 and some
+    some = (
+        motion.slips or motion.skewness < limits.skewness_certain
+    )  # two lines in step may hide the shape of slips
+    return motion.events >= limits.fewest_cycles and motion.skewness > 0.0 and some
 
 
-def _lacks(a: SignalAnswers, t: SignalThresholds) -> float:
+def _lacks(motion: SignalAnswers, limits: SignalThresholds) -> float:
     """The part of the energy that stick would have and lines in step lack, where it is not there; otherwise 0."""
-    if a.skewness < t.skewness_certain and a.overtones <= t.overtones:
-        return t.overtones
-    return t.beyond_lines if a.skewness < t.skewness_lines and a.beyond_lines <= t.beyond_lines else 0.0
+    if motion.skewness < limits.skewness_certain and motion.overtones <= limits.overtones:
+        return limits.overtones
+    return (
+        limits.beyond_lines
+        if motion.skewness < limits.skewness_lines and motion.beyond_lines <= limits.beyond_lines
+        else 0.0
+    )
 
 
 _LONGER = "measure longer"
 ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
     Row(
         "few samples",
-        lambda a, t: a.samples < FEWEST_SAMPLES,
-        "only {a.samples:.0f} samples without a gap",
+        lambda motion, limits: motion.samples < FEWEST_SAMPLES,
+        "only {samples:.0f} samples without a gap",
         _LONGER,
     ),
     Row(
         "noise",
-        lambda a, t: not a.heard,
+        lambda motion, limits: not motion.heard,
         "the vibration is hidden by noise",
         "measure closer to the shoe, or with less noise",
     ),
-    Row("few cycles", lambda a, t: a.cycles < t.fewest_cycles, "only {a.cycles:.0f} cycles", _LONGER),
+    Row(
+        "few cycles",
+        lambda motion, limits: motion.cycles < limits.fewest_cycles,
+        "only {cycles:.0f} cycles",
+        _LONGER,
+    ),
     Row(
         "few samples in a cycle",
-        lambda a, t: a.samples_per_cycle < t.samples_per_cycle,
-        "only {a.samples_per_cycle:.1f} samples a cycle",
+        lambda motion, limits: motion.samples_per_cycle < limits.samples_per_cycle,
+        "only {samples_per_cycle:.1f} samples a cycle",
         "measure at a higher rate",
     ),
     Row(
         "died out",
-        lambda a, t: a.was_loud and a.died_to <= max(t.negligible, a.hidden),
-        "the vibration has died out: down to {a.died_to:.2g} of its largest",
+        lambda motion, limits: motion.was_loud and motion.died_to <= max(limits.negligible, motion.hidden),
+        "the vibration has died out: down to {died_to:.2g} of its largest",
         "",
         Regime.DAMPED,
     ),
     Row(
         "still changes",
-        lambda a, t: not steady(a.change, a.change_error, t),
-        "the level {a.word} by e^{a.change:.2g} in the second half",
+        lambda motion, limits: not steady(motion.change, motion.change_error, limits),
+        "the level {word} by e^{change:.2g} in the second half",
         "measure longer, until it does not",
     ),
     Row(
         "slips or lines",
-        lambda a, t: _skewed(a, t) and a.noise_share > _lacks(a, t) / _TELLS > 0.0,
+        lambda motion, limits: (
+            _skewed(motion, limits) and motion.noise_share > _lacks(motion, limits) / _TELLS > 0.0
+        ),
         "stick, or lines in phase, have skewed the velocity, and noise hides which of them",
         "measure with less noise, or for longer",
     ),
     Row(
         "slips",
-        lambda a, t: _skewed(a, t) and a.slips and not _lacks(a, t),
-        "{a.events:.0f} events of stick and slip: skewness of the velocity {a.skewness:.2g}",
+        lambda motion, limits: _skewed(motion, limits) and motion.slips and not _lacks(motion, limits),
+        "{events:.0f} events of stick and slip: skewness of the velocity {skewness:.2g}",
         "",
         Regime.RELAXATION,
     ),
     Row(
         "stays at the belt's speed",
-        lambda a, t: a.plateau > t.plateau and a.knows_belt,
-        "the velocity is that of the belt for {a.sticks:.0%} of the time, in most cycles or in all",
+        lambda motion, limits: motion.plateau > limits.plateau and motion.knows_belt,
+        "the velocity is that of the belt for {sticks:.0%} of the time, in most cycles or in all",
         "",
         Regime.RELAXATION,
     ),
     Row(
         "stays at one speed",
-        lambda a, t: a.plateau > t.plateau,
+        lambda motion, limits: motion.plateau > limits.plateau,
         "the velocity has a plateau on one side, which short stick can cause",
-        "{a.give_belt}",
+        "{give_belt}",
     ),
     Row(
         "reaches the belt's speed",
-        lambda a, t: a.reaches,
+        lambda motion, limits: motion.reaches,
         "the velocity just reaches that of the belt",
         "less noise may show whether it stays",
     ),
     Row(
         "irregular",
-        lambda a, t: a.line_share < t.line_share,
-        "irregular without stick: {a.line_share:.0%} of the energy in three lines",
+        lambda motion, limits: motion.line_share < limits.line_share,
+        "irregular without stick: {line_share:.0%} of the energy in three lines",
         _LONGER,
     ),
     Row(
         "lines",
-        lambda a, t: True,
-        "sustained without stick[: {a.line_share:.0%} of the energy in at most three lines]{a.unseen}",
+        lambda motion, limits: True,
+        "sustained without stick[: {line_share:.0%} of the energy in at most three lines]{unseen}",
         "",
         Regime.QUASI_HARMONIC,
     ),

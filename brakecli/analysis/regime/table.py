@@ -31,108 +31,118 @@ _DASHPOT = "a dashpot would decide"
 _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
 _SOURCES = (
-    "[of its power friction gives {a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W; ]"
-    "[neighbours change at {a.exponent:.2g} 1/s; ]without the roughness {a.becomes}"
+    "[of its power friction gives {power_of_friction:.2g} W and the roughness {power_of_roughness:.2g} W; ]"
+    "[neighbours change at {exponent:.2g} 1/s; ]without the roughness {becomes}"
 )
-_DECAYS = _LINEAR + ": the shoe's own vibration decays at {a.decay:.3g} 1/s ({a.ringing:.4g} Hz)"
+_DECAYS = _LINEAR + ": the shoe's own vibration decays at {decay:.3g} 1/s ({ringing:.4g} Hz)"
 
 CONTACT: tuple[Row[Answers, Thresholds], ...] = (
-    Row("failed", lambda a, t: a.failure, "the run failed: {a.failure}"),
-    Row("older file", lambda a, t: a.unasked, "the file is older than the questions that decide", "{a.unasked}"),
-    Row("never touched", lambda a, t: a.never, "the shoe has never touched the wheel", _CHECK),
-    Row("lost", lambda a, t: a.lost, "the shoe has lost contact for good", _CHECK),
+    Row("failed", lambda motion, limits: motion.failure, "the run failed: {failure}"),
+    Row(
+        "older file",
+        lambda motion, limits: motion.unasked,
+        "the file is older than the questions that decide",
+        "{unasked}",
+    ),
+    Row("never touched", lambda motion, limits: motion.never, "the shoe has never touched the wheel", _CHECK),
+    Row("lost", lambda motion, limits: motion.lost, "the shoe has lost contact for good", _CHECK),
     Row(
         "left",
-        lambda a, t: a.left,
+        lambda motion, limits: motion.left,
         "the shoe has left the wheel",
         "run longer, to see whether it comes back",
         longer=True,
     ),
     Row(
         "at rest",
-        lambda a, t: a.carried and a.stands,
+        lambda motion, limits: motion.carried and motion.stands,
         "the shoe has come to rest, sticking to the standing wheel",
         "",
         _DAMPED,
     ),
     Row(
         "not held",
-        lambda a, t: a.carried and not a.held,
+        lambda motion, limits: motion.carried and not motion.held,
         "the shoe sticks throughout and is carried along by the wheel: no link holds it along the wheel",
         "incline a link, by its angle_deg",
     ),
     Row(
         "locks itself",
-        lambda a, t: a.carried and a.steady and math.isfinite(a.locks),
+        lambda motion, limits: motion.carried and motion.steady and math.isfinite(motion.locks),
         "the shoe sticks throughout and is carried along by the wheel: it locks itself, as friction grows faster "
         "with x than the force that it needs, so that no longer run will see it slip",
-        "it slips below a friction coefficient of {a.locks:.4g}",
+        "it slips below a friction coefficient of {locks:.4g}",
     ),
     Row(
         "carried",
-        lambda a, t: a.carried,
+        lambda motion, limits: motion.carried,
         "the shoe sticks throughout and is carried along by the wheel",
         "run longer",
         longer=True,
     ),
     Row(
         "few samples",
-        lambda a, t: a.few_samples,
-        "only {a.samples} samples, too few",
+        lambda motion, limits: motion.few_samples,
+        "only {samples} samples, too few",
         "run longer, or sample more often",
         longer=True,
     ),
     Row(
         "changes",
-        lambda a, t: not a.steady,
+        lambda motion, limits: not motion.steady,
         "the wheel's speed or the load changes with time, so the motion cannot settle",
     ),
     Row(
         "nothing moves yet",
-        lambda a, t: not a.moves and a.growth > 0.0,
-        "nothing moves yet, but sliding is unstable: a disturbance grows at {a.growth:.3g} 1/s",
-        "start beside steady sliding{a.or_longer}",
-        longer=lambda a: a.or_longer,
+        lambda motion, limits: not motion.moves and motion.growth > 0.0,
+        "nothing moves yet, but sliding is unstable: a disturbance grows at {growth:.3g} 1/s",
+        "start beside steady sliding{or_longer}",
+        longer=lambda motion: motion.or_longer,
     ),
     Row(
         "nothing moves",
-        lambda a, t: not a.moves,
+        lambda motion, limits: not motion.moves,
         "nothing moves beyond rounding: the shoe slides steadily or rests",
         "",
         _DAMPED,
     ),
     Row(
         "standing wheel",
-        lambda a, t: a.stands and not a.undamped,
+        lambda motion, limits: motion.stands and not motion.undamped,
         "the wheel stands: friction and dashpots take the energy",
         "",
         _DAMPED,
     ),
-    Row("standing wheel, no dashpots", lambda a, t: a.stands, "the wheel stands, but no dashpot damps", _DASHPOT),
+    Row(
+        "standing wheel, no dashpots",
+        lambda motion, limits: motion.stands,
+        "the wheel stands, but no dashpot damps",
+        _DASHPOT,
+    ),
 )
 COMES_AND_GOES: Row[Answers, Thresholds] = Row(
     "comes and goes",
-    lambda a, t: not math.isfinite(a.change),
+    lambda motion, limits: not math.isfinite(motion.change),
     "the motion comes and goes: in a part of the second half nothing moves",
     "run longer",
     longer=True,
 )
 _HELD: Row[Answers, Thresholds] = Row(
     "linear, held by the steps",
-    lambda a, t: a.linear and grows(a, t) and a.steadier,
-    _LINEAR + ": it grows at {a.own:.3g} 1/s, but the scheme's steps damp it",
-    "{a.steadier}",
+    lambda motion, limits: motion.linear and grows(motion, limits) and motion.steadier,
+    _LINEAR + ": it grows at {own:.3g} 1/s, but the scheme's steps damp it",
+    "{steadier}",
 )
 _GROWS: Row[Answers, Thresholds] = Row(
     "linear, grows",
-    lambda a, t: a.linear and grows(a, t),
-    _LINEAR + ": still growing at {a.own:.3g} 1/s ({a.ringing:.4g} Hz)",
-    "run at least {a.grown:.3g} s",
+    lambda motion, limits: motion.linear and grows(motion, limits),
+    _LINEAR + ": still growing at {own:.3g} 1/s ({ringing:.4g} Hz)",
+    "run at least {grown:.3g} s",
     longer=True,
 )
 _NO_DASHPOTS: Row[Answers, Thresholds] = Row(
     "no friction, no dashpots",
-    lambda a, t: a.frictionless,
+    lambda motion, limits: motion.frictionless,
     "without friction nothing excites the shoe, but no dashpot damps it",
     _DASHPOT,
 )
@@ -141,15 +151,20 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     _GROWS,
     Row(
         "linear, decays",
-        lambda a, t: a.linear and decays(a, t),
+        lambda motion, limits: motion.linear and decays(motion, limits),
         _DECAYS,
         "",
         _DAMPED,
     ),
-    Row("linear, neutral", lambda a, t: a.linear, _LINEAR + ": it neither grows nor decays", _DASHPOT),
+    Row(
+        "linear, neutral",
+        lambda motion, limits: motion.linear,
+        _LINEAR + ": it neither grows nor decays",
+        _DASHPOT,
+    ),
     Row(
         "no friction",
-        lambda a, t: a.frictionless and not a.undamped,
+        lambda motion, limits: motion.frictionless and not motion.undamped,
         "without friction nothing excites the shoe, and the dashpots damp it",
         "",
         _DAMPED,
@@ -157,34 +172,36 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     _NO_DASHPOTS,
     Row(
         "no dashpots",
-        lambda a, t: a.undamped and not a.growth > 0.0,
+        lambda motion, limits: motion.undamped and not motion.growth > 0.0,
         "sliding is stable, and no dashpot makes a large vibration settle",
         _DASHPOT,
     ),
     Row(
         "fades",
-        lambda a, t: a.without_waves == Continuation.DIES,
+        lambda motion, limits: motion.without_waves == Continuation.DIES,
         "the vibration dies out: continued, it comes to steady sliding",
         "",
         _DAMPED,
     ),
     Row(
         "lasts",
-        lambda a, t: a.without_waves == Continuation.LASTS and same(a, t),
-        "the vibration lasts[: continued, it comes to an amplitude of {a.amplitude_without_waves:.3g} m]",
+        lambda motion, limits: motion.without_waves == Continuation.LASTS and same(motion, limits),
+        "the vibration lasts[: continued, it comes to an amplitude of {amplitude_without_waves:.3g} m]",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "on its way",
-        lambda a, t: a.without_waves == Continuation.LASTS and math.isfinite(a.amplitude_without_waves),
-        "the vibration lasts, and is still on its way to an amplitude of {a.amplitude_without_waves:.3g} m",
+        lambda motion, limits: (
+            motion.without_waves == Continuation.LASTS and math.isfinite(motion.amplitude_without_waves)
+        ),
+        "the vibration lasts, and is still on its way to an amplitude of {amplitude_without_waves:.3g} m",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "lasts, irregular",
-        lambda a, t: a.without_waves == Continuation.LASTS and steady(a, t),
+        lambda motion, limits: motion.without_waves == Continuation.LASTS and steady(motion, limits),
         "the vibration lasts, as sliding is unstable, and its level does not change",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
@@ -192,24 +209,24 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     COMES_AND_GOES,
     Row(
         "undecided",
-        lambda a, t: True,
-        "[the level {a.word} by e^{a.change:.2g} in the second half, and ]what it comes to is not known",
-        "run at least {a.longer:.3g} s",
+        lambda motion, limits: True,
+        "[the level {word} by e^{change:.2g} in the second half, and ]what it comes to is not known",
+        "run at least {longer:.3g} s",
         longer=True,
     ),
 )
 ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "shorter than a wave",
-        lambda a, t: a.duration < a.slowest,
-        "the run is shorter than the period of the slowest wave, {a.slowest:.3g} s",
-        "run at least {a.two_waves:.3g} s",
+        lambda motion, limits: motion.duration < motion.slowest,
+        "the run is shorter than the period of the slowest wave, {slowest:.3g} s",
+        "run at least {two_waves:.3g} s",
         longer=True,
     ),
     _HELD,
     Row(
         "linear, forced",
-        lambda a, t: a.linear and decays(a, t) and not a.undamped,
+        lambda motion, limits: motion.linear and decays(motion, limits) and not motion.undamped,
         "only the roughness shakes the shoe: " + _DECAYS,
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
@@ -217,14 +234,14 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     _GROWS,
     Row(
         "linear, open",
-        lambda a, t: a.linear,
-        _LINEAR + ": neighbours neither come together nor part surely[, at {a.even:.2g} ± {a.even_error:.1g} 1/s]",
+        lambda motion, limits: motion.linear,
+        _LINEAR + ": neighbours neither come together nor part surely[, at {even:.2g} ± {even_error:.1g} 1/s]",
         "run longer; without dashpots, " + _DASHPOT,
         longer=True,
     ),
     Row(
         "forced, no friction",
-        lambda a, t: a.frictionless and not a.undamped,
+        lambda motion, limits: motion.frictionless and not motion.undamped,
         "only the roughness shakes the shoe: without friction nothing else excites it",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
@@ -232,25 +249,25 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     _NO_DASHPOTS,
     Row(
         "bounces",
-        lambda a, t: not a.touches,
+        lambda motion, limits: not motion.touches,
         "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good",
         _CHECK,
     ),
     Row(
         "forced, neighbours",
-        lambda a, t: a.without_waves == Continuation.DIES and together(a, t),
+        lambda motion, limits: motion.without_waves == Continuation.DIES and together(motion, limits),
         "only the roughness shakes the shoe: without it the vibration dies out, and small disturbances "
-        "have a growth rate of {a.exponent:.3g} 1/s",
+        "have a growth rate of {exponent:.3g} 1/s",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
     Row(
         "forced, level",
-        lambda a, t: (
-            a.without_waves == Continuation.DIES
-            and (steady(a, t) or a.change < 0.0)
-            and friction_gives_less(a, t)
-            and not a.undamped
+        lambda motion, limits: (
+            motion.without_waves == Continuation.DIES
+            and (steady(motion, limits) or motion.change < 0.0)
+            and friction_gives_less(motion, limits)
+            and not motion.undamped
         ),
         "only the roughness shakes the shoe: without it the vibration dies out, and its level does not grow",
         regime=Regime.DAMPED,
@@ -258,55 +275,62 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "forced, friction takes",
-        lambda a, t: (
-            takes(a, t)
-            and roughness_gives_most(a, t)
-            and (steady(a, t) or a.without_waves == Continuation.DIES)
-            and not a.undamped
+        lambda motion, limits: (
+            takes(motion, limits)
+            and roughness_gives_most(motion, limits)
+            and (steady(motion, limits) or motion.without_waves == Continuation.DIES)
+            and not motion.undamped
         ),
-        "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, and friction takes "
-        "{a.taken:.2g} W from the vibration",
+        "only the roughness shakes the shoe: it gives {power_of_roughness:.2g} W, and friction takes "
+        "{taken:.2g} W from the vibration",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
     Row(
         "forced, roughness gives",
-        lambda a, t: together(a, t) and steady(a, t) and roughness_gives_most(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: it gives {a.power_of_roughness:.2g} W, friction "
-        "{a.power_of_friction:.2g} W, and small disturbances have a growth rate of {a.exponent:.3g} 1/s",
+        lambda motion, limits: (
+            together(motion, limits)
+            and steady(motion, limits)
+            and roughness_gives_most(motion, limits)
+            and not motion.undamped
+        ),
+        "only the roughness shakes the shoe: it gives {power_of_roughness:.2g} W, friction "
+        "{power_of_friction:.2g} W, and small disturbances have a growth rate of {exponent:.3g} 1/s",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
     Row(
         "forced, another level",
-        lambda a, t: together(a, t) and steady(a, t) and another(a, t) and not a.undamped,
-        "only the roughness shakes the shoe: small disturbances have a growth rate of {a.exponent:.3g} 1/s, and "
-        "vx has {a.level:.3g} m/s, not the {a.level_without_waves:.3g} m/s to which it would come without the "
+        lambda motion, limits: (
+            together(motion, limits) and steady(motion, limits) and another(motion, limits) and not motion.undamped
+        ),
+        "only the roughness shakes the shoe: small disturbances have a growth rate of {exponent:.3g} 1/s, and "
+        "vx has {level:.3g} m/s, not the {level_without_waves:.3g} m/s to which it would come without the "
         "roughness",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
     Row(
         "dies out, not yet",
-        lambda a, t: a.without_waves == Continuation.DIES and not steady(a, t),
-        "without the roughness the vibration dies out, but its level still {a.word} by e^{a.change:.2g} in the "
+        lambda motion, limits: motion.without_waves == Continuation.DIES and not steady(motion, limits),
+        "without the roughness the vibration dies out, but its level still {word} by e^{change:.2g} in the "
         "second half",
-        "run at least {a.waited:.3g} s",
+        "run at least {waited:.3g} s",
         longer=True,
     ),
     Row(
         "no dashpots, rough",
-        lambda a, t: a.undamped and not a.growth > 0.0,
+        lambda motion, limits: motion.undamped and not motion.growth > 0.0,
         "no dashpot damps what the shoe adds to what the waves force",
         _DASHPOT,
     ),
     Row(
         "self-excited",
-        lambda a, t: (
-            a.without_waves == Continuation.LASTS
-            and apart(a, t)
-            and (a.growth > 0.0 or (steady(a, t) and not another(a, t)))
-            and gives(a, t)
+        lambda motion, limits: (
+            motion.without_waves == Continuation.LASTS
+            and apart(motion, limits)
+            and (motion.growth > 0.0 or (steady(motion, limits) and not another(motion, limits)))
+            and gives(motion, limits)
         ),
         "the vibration lasts without the roughness, with a phase of its own",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
@@ -314,12 +338,12 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "locked to the waves",
-        lambda a, t: (
-            a.without_waves == Continuation.LASTS
-            and together(a, t)
-            and steady(a, t)
-            and same(a, t)
-            and friction_gives_most(a, t)
+        lambda motion, limits: (
+            motion.without_waves == Continuation.LASTS
+            and together(motion, limits)
+            and steady(motion, limits)
+            and same(motion, limits)
+            and friction_gives_most(motion, limits)
         ),
         "the vibration lasts without the roughness at the same level, and is locked to it",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
@@ -327,45 +351,47 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "kept up by friction",
-        lambda a, t: (
-            a.without_waves == Continuation.LASTS
-            and steady(a, t)
-            and (same(a, t) or (roughness_is_idle(a, t) and not another(a, t)))
-            and friction_gives_most(a, t)
-            and not a.undamped
+        lambda motion, limits: (
+            motion.without_waves == Continuation.LASTS
+            and steady(motion, limits)
+            and (same(motion, limits) or (roughness_is_idle(motion, limits) and not another(motion, limits)))
+            and friction_gives_most(motion, limits)
+            and not motion.undamped
         ),
         "the vibration lasts without the roughness, and of its power friction gives "
-        "{a.power_of_friction:.2g} W and the roughness {a.power_of_roughness:.2g} W",
+        "{power_of_friction:.2g} W and the roughness {power_of_roughness:.2g} W",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     COMES_AND_GOES,
     Row(
         "still changes",
-        lambda a, t: not steady(a, t),
-        "the level {a.word} by e^{a.change:.2g} in the second half",
-        "run at least {a.longer:.3g} s",
+        lambda motion, limits: not steady(motion, limits),
+        "the level {word} by e^{change:.2g} in the second half",
+        "run at least {longer:.3g} s",
         longer=True,
     ),
     Row(
         "energy still changes",
-        lambda a, t: math.isfinite(a.power_left) and not balances(a, t),
-        "the level of vx does not change, but the energy does: friction gives {a.power_of_friction:.2g} W and the "
-        "roughness {a.power_of_roughness:.2g} W, {a.power_left:.2g} W more than dashpots take",
+        lambda motion, limits: math.isfinite(motion.power_left) and not balances(motion, limits),
+        "the level of vx does not change, but the energy does: friction gives {power_of_friction:.2g} W and the "
+        "roughness {power_of_roughness:.2g} W, {power_left:.2g} W more than dashpots take",
         "run longer",
         longer=True,
     ),
     Row(
         "phase not known",
-        lambda a, t: math.isfinite(a.exponent_error) and not (together(a, t) or apart(a, t)),
-        "it is not certain whether neighbours come together: they change at {a.exponent:.2g} ± "
-        "{a.exponent_error:.1g} 1/s; " + _SOURCES,
-        "run at least {a.told_apart:.3g} s",
+        lambda motion, limits: (
+            math.isfinite(motion.exponent_error) and not (together(motion, limits) or apart(motion, limits))
+        ),
+        "it is not certain whether neighbours come together: they change at {exponent:.2g} ± "
+        "{exponent_error:.1g} 1/s; " + _SOURCES,
+        "run at least {told_apart:.3g} s",
         longer=True,
     ),
     Row(
         "either",
-        lambda a, t: True,
+        lambda motion, limits: True,
         "friction and the roughness may both keep the vibration up: " + _SOURCES,
         longer=True,
     ),
