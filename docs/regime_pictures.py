@@ -291,8 +291,8 @@ def _edges(samples: int, parts: float) -> NDArray[np.int64]:
 def level(evidence: dict[str, Any]) -> str:
     """Whether it lasts, in words."""
     limits = Thresholds()
-    change = evidence["change"]
-    error = evidence["change_error"]
+    change = evidence["level_change"]
+    error = evidence["level_change_error"]
     steady = abs(change) <= max(limits.sure_errors * error, 2.0 * limits.settled_within)
     word = "grows" if change > 0.0 else "falls"
     if steady:
@@ -309,9 +309,9 @@ def answers(numbers: dict[str, Any]) -> str:
     if numbers["growth_rate"] is not None:
         lines.append(f"theory: {numbers['growth_rate']:.3g} 1/s")
     elif "exponent" in evidence:
-        lines.append(f"neighbours: {evidence['exponent']:.2g} ± {evidence['exponent_error']:.1g} 1/s")
-    if evidence.get("growth") and "linear" not in evidence:
-        lines.append(f"sliding: {'unstable' if evidence['growth'] > 0.0 else 'stable'}")
+        lines.append(f"neighbours: {evidence['lyapunov_exponent']:.2g} ± {evidence['lyapunov_error']:.1g} 1/s")
+    if evidence.get("growth_rate") and "linear" not in evidence:
+        lines.append(f"sliding: {'unstable' if evidence['growth_rate'] > 0.0 else 'stable'}")
     if "without_waves" in evidence:
         size = evidence.get("amplitude_without_waves")
         word = "dies out" if evidence["without_waves"] == "dies" else "lasts"

@@ -69,12 +69,12 @@ VERDICT = within(
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
 _EVIDENCE_UNITS = {
-    "1/s": r"growth.*|exponent.*|even(_.*)?|rate_.*",
-    "m/s": r"amplitude_v.*|level.*",
+    "1/s": r"growth.*|lyapunov.*|exponent.*|even(_.*)?|rate_.*",
+    "m/s": r"amplitude_v.*|level(_without_waves)?",
     "m": r"amplitude.*",
     "Hz": r"frequency.*|line_freq.*|ringing.*",
     "W": r"power_.*|friction_error.*|roughness_error.*",
-    "s": r"duration.*|seconds.*|slowest.*|period_.*|to_limit.*",
+    "s": r"(settled_)?duration|seconds|slowest.*|period_.*|(time_)?to_limit",
 }
 """Patterns of the names of the evidence, the first that fits; all others are pure numbers."""
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from brakecli.analysis.over_time import over_time
-from brakecli.analysis.regime.answers import Answers
+from brakecli.analysis.regime.answers import RENAMED, Answers
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.table import decide
 from brakecli.case.read import parse_case
@@ -43,7 +43,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         failure = run.attributes.get("failure")
         system = run.system
         numbers = {each.name: plain(run.attributes.get(each.name)) for each in fields.VERDICT}
-        evidence = {name: plain(value) for name, value in run.evidence.items()}
+        evidence = {RENAMED.get(name, name): plain(value) for name, value in run.evidence.items()}
         changing = over_time(run.history, system) if not failure and not system.steady else None
         shown = {each.name: run.attributes.get(each.name) for each in fields.EXPONENT}
         shown |= {"failure": failure, "vibrations": fields.VIBRATIONS.read({"over_time": changing})}
@@ -75,7 +75,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
 
 def _older(evidence: Mapping[str, Any]) -> bool:
     """Whether a record lacks answers that rows ask for: all of them, or what powers leave open."""
-    return "row" not in evidence or ("power_of_friction" in evidence and "power_left" not in evidence)
+    return "row" not in evidence or ("power_of_friction" in evidence and "power_stored" not in evidence)
 
 
 @contextmanager

@@ -123,11 +123,13 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
     fades = np.exp(values * (end - reached)) - np.exp(values * (start - reached))
     height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = system.coefficients.grip(theory.belt) * -system.contact_stiffness * float(height)
-    answers = Answers(duration=end, linear=True, growth=theory.mode.growth, ringing=theory.mode.frequency)
+    answers = Answers(
+        duration=end, linear=True, growth_rate=theory.mode.growth, ringing_frequency=theory.mode.frequency
+    )
     if theory.direction > 0:
-        answers = answers._replace(to_limit=theory.seconds_to_limit(end, last))
+        answers = answers._replace(time_to_limit=theory.seconds_to_limit(end, last))
     decision = decide(answers, Thresholds())
-    evidence = {"row": decision.row, "growth": theory.mode.growth}
+    evidence = {"row": decision.row, "growth_rate": theory.mode.growth}
     numbers: dict[str, Any] = {
         "stick_fraction": 0.0,
         "contact_loss_fraction": 0.0,
@@ -193,7 +195,7 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
     force = float(o.force)
     answers = Answers(
         duration=end,
-        growth=theory.mode.growth,
+        growth_rate=theory.mode.growth,
         without_waves=Continuation.LASTS,
         level=1.0,  # the same as on the orbit
         level_without_waves=1.0,
@@ -201,7 +203,7 @@ def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, li
         settled=True,
         period_without_waves=period,
         sticks_without_waves=float(orbit.word.count(STICK)),
-        seconds=part,
+        settled_duration=part,
         cycles=part / period,
         samples_per_cycle=period / interval,
     )

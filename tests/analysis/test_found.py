@@ -41,7 +41,7 @@ def test_a_shoe_that_locks_itself_is_not_called_forced_while_it_drifts_away() ->
     assert stability(system_of(make(tables))).equilibrium is None
     verdict = judged("locks itself")
     assert verdict.regime is Regime.UNDECIDED
-    assert verdict.evidence["growth"] == pytest.approx(Shoe.of(tables).rate, rel=1e-3)  # in full contact
+    assert verdict.evidence["growth_rate"] == pytest.approx(Shoe.of(tables).rate, rel=1e-3)  # in full contact
 
 
 @campaign
@@ -174,7 +174,9 @@ def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
     """Neighbouring runs part at 7.3 1/s, and the amplitude of a longer run is half, or two and a half times."""
     verdict = judged("chaotic")
     assert verdict.regime is Regime.UNDECIDED
-    assert verdict.evidence["exponent"] == pytest.approx(7.3, abs=3.0 * verdict.evidence["exponent_error"])
+    assert verdict.evidence["lyapunov_exponent"] == pytest.approx(
+        7.3, abs=3.0 * verdict.evidence["lyapunov_error"]
+    )
 
 
 @pytest.mark.parametrize(
@@ -457,7 +459,7 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
         again = verdict_of(make(tables, solver__duration=needed))
         reasons = [re.sub(r"[\d.e+-]+", "", ASKED.sub("", each.reasons[0])) for each in (first, again)]
         rates = [
-            abs(each.evidence.get("change", 0.0)) / time
+            abs(each.evidence.get("level_change", 0.0)) / time
             for each, time in zip((first, again), (duration, needed), strict=True)
         ]
         explained = reasons[0] != reasons[1] or rates[1] < 0.8 * rates[0]
@@ -498,7 +500,7 @@ def test_a_ring_down_on_or_near_lines_of_the_roughness_is_still_decaying(name: s
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
     assert (verdict.settled, verdict.amplitude_spread) == (False, None)
     half = 0.5 * SHOES[name]["solver"]["duration"]
-    assert -verdict.evidence["change"] / half == pytest.approx(rate, rel=0.2)
+    assert -verdict.evidence["level_change"] / half == pytest.approx(rate, rel=0.2)
 
 
 def test_a_ring_down_beside_a_wave_has_no_amplitude_that_lasts() -> None:
@@ -592,9 +594,9 @@ def test_what_friction_feeds_is_not_called_forced_as_steps_end_at_its_events(nam
     assert (verdict.regime, verdict.excitation) == (regime, Excitation.SELF_EXCITED)
     found = verdict.evidence
     given = found["power_of_friction"] + found["power_of_roughness"]
-    left = found["power_left"]
+    left = found["power_stored"]
     assert given == pytest.approx(found["power_dashpots"] + left, abs=0.02 * found["power_dashpots"])
-    error = math.hypot(found["friction_error"], found["roughness_error"])
+    error = math.hypot(found["power_of_friction_error"], found["power_of_roughness_error"])
     assert abs(left) <= 3.0 * error
 
 

@@ -149,7 +149,7 @@ def test_a_motion_that_still_grows_or_decays_is_undecided_and_says_how_fast(rate
     verdict = classified(made(1e-3 * np.exp(rate * TIME) * np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0))
     assert verdict.regime is Regime.UNDECIDED
     assert word in verdict.reasons[0]
-    assert verdict.evidence["change"] == pytest.approx(rate * 0.5 * TIME[-1], rel=0.02)
+    assert verdict.evidence["level_change"] == pytest.approx(rate * 0.5 * TIME[-1], rel=0.02)
 
 
 def test_a_decay_to_nothing_is_damped() -> None:

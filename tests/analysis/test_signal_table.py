@@ -21,8 +21,8 @@ SINE = SignalAnswers(
     died_to=1.0,
     hidden=0.01,
     was_loud=True,
-    change=0.0,
-    change_error=0.01,
+    level_change=0.0,
+    level_change_error=0.01,
     skewness=0.0,
     events=100.0,
     overtones=0.0,
@@ -41,7 +41,7 @@ ANSWERS: dict[str, dict[str, Any]] = {
     "few cycles": {"cycles": 9.0},
     "few samples in a cycle": {"samples_per_cycle": 7.0},
     "died out": {"died_to": 0.04},
-    "still changes": {"change": -0.5},
+    "still changes": {"level_change": -0.5},
     "slips or lines": LINES | {"noise_share": 0.02},
     "slips": STICK,
     "stays at the belt's speed": {"plateau": 3.0, "knows_belt": True},
@@ -53,8 +53,8 @@ ANSWERS: dict[str, dict[str, Any]] = {
 THRESHOLDS: dict[str, tuple[float, dict[str, Any], str, str]] = {
     "fewest_cycles": (120.0, {}, "lines", "few cycles"),
     "samples_per_cycle": (60.0, {}, "lines", "few samples in a cycle"),
-    "negligible": (0.2, {"change": 0.3}, "still changes", "lines"),
-    "sure_errors": (8.0, {"change": 0.3, "change_error": 0.05}, "still changes", "lines"),
+    "negligible": (0.2, {"level_change": 0.3}, "still changes", "lines"),
+    "sure_errors": (8.0, {"level_change": 0.3, "level_change_error": 0.05}, "still changes", "lines"),
     "skewness_certain": (0.5, LINES, "lines", "slips"),
     "skewness_lines": (3.0, STICK | {"beyond_lines": 0.0}, "slips", "lines"),
     "overtones": (0.001, LINES, "lines", "slips"),
@@ -85,7 +85,7 @@ def test_every_threshold_moves_a_verdict(name: str) -> None:
 def test_noise_and_a_level_among_noise_count_as_nothing() -> None:
     assert decide(replace(SINE, died_to=0.1, hidden=0.15), SignalThresholds()).row == "died out"
     assert decide(replace(SINE, died_to=0.01, was_loud=False), SignalThresholds()).row == "lines"
-    assert decide(replace(SINE, change=0.5, change_error=0.2), SignalThresholds()).row == "lines"
+    assert decide(replace(SINE, level_change=0.5, level_change_error=0.2), SignalThresholds()).row == "lines"
 
 
 TIME = np.arange(5000.0)

@@ -15,85 +15,105 @@ from tests import sentences
 
 LIMITS = Thresholds()
 MOVING = Answers(
-    duration=10.0, samples=10_000, growth=-1.0, ringing=100.0, change=0.0, change_error=0.01, amplitude=1.0,
-    level=1.0, seconds=5.0, settled=True, cycles=100.0, frequency=100.0, samples_per_cycle=20.0, stick_cycles=0.0,
+    duration=10.0,
+    samples=10_000,
+    growth_rate=-1.0,
+    ringing_frequency=100.0,
+    level_change=0.0,
+    level_change_error=0.01,
+    amplitude=1.0,
+    level=1.0,
+    settled_duration=5.0,
+    settled=True,
+    cycles=100.0,
+    frequency=100.0,
+    samples_per_cycle=20.0,
+    stick_cycles=0.0,
     harmonic_share=1.0,
-)  # fmt: skip
+)
 LASTS: dict[str, Any] = {
     "without_waves": Continuation.LASTS,
     "amplitude_without_waves": 1.0,
     "level_without_waves": 1.0,
 }
 SHAKEN: dict[str, Any] = {
-    "waves": True, "slowest": 1.0, "exponent": 0.0, "exponent_error": 0.01, "even": 0.0, "even_error": 0.01,
-    "power_of_friction": 1.0, "friction_error": 0.1, "power_of_roughness": 0.1, "roughness_error": 0.1,
-    "power_left": 0.0,
-}  # fmt: skip
-FADING: dict[str, Any] = {**SHAKEN, "exponent": -1.0}
+    "waves": True,
+    "slowest_wave_period": 1.0,
+    "lyapunov_exponent": 0.0,
+    "lyapunov_error": 0.01,
+    "lyapunov_by_line": 0.0,
+    "lyapunov_by_line_error": 0.01,
+    "power_of_friction": 1.0,
+    "power_of_friction_error": 0.1,
+    "power_of_roughness": 0.1,
+    "power_of_roughness_error": 0.1,
+    "power_stored": 0.0,
+}
+FADING: dict[str, Any] = {**SHAKEN, "lyapunov_exponent": -1.0}
 SMOOTH_ROWS: dict[str, dict[str, Any]] = {
     "failed": {"failure": "it broke"},
     "older file": {"unasked": "run it"},
-    "never touched": {"never": True, "lost": True},
-    "lost": {"lost": True},
-    "left": {"left": True},
-    "at rest": {"carried": True, "stands": True},
-    "not held": {"carried": True, "held": False},
-    "locks itself": {"carried": True, "locks": 0.5},
-    "carried": {"carried": True},
+    "never touched": {"never_touched": True, "contact_lost": True},
+    "lost": {"contact_lost": True},
+    "left": {"contact_left": True},
+    "at rest": {"carried_along": True, "wheel_stands": True},
+    "not held": {"carried_along": True, "held_by_link": False},
+    "locks itself": {"carried_along": True, "locking_friction": 0.5},
+    "carried": {"carried_along": True},
     "few samples": {"few_samples": True},
-    "changes": {"steady": False},
-    "nothing moves yet": {"moves": False, "growth": 1.0},
+    "changes": {"constant_speed_and_load": False},
+    "nothing moves yet": {"moves": False, "growth_rate": 1.0},
     "nothing moves": {"moves": False},
-    "standing wheel": {"stands": True},
-    "standing wheel, no dashpots": {"stands": True, "undamped": True},
-    "linear, held by the steps": {"linear": True, "growth": 1.0, "steadier": "take half weights"},
-    "linear, grows": {"linear": True, "growth": 1.0, "to_limit": 3.0},
+    "standing wheel": {"wheel_stands": True},
+    "standing wheel, no dashpots": {"wheel_stands": True, "undamped": True},
+    "linear, held by the steps": {"linear": True, "growth_rate": 1.0, "steadier": "take half weights"},
+    "linear, grows": {"linear": True, "growth_rate": 1.0, "time_to_limit": 3.0},
     "linear, decays": {"linear": True},
-    "linear, neutral": {"linear": True, "growth": 0.0},
+    "linear, neutral": {"linear": True, "growth_rate": 0.0},
     "no friction": {"frictionless": True},
     "no friction, no dashpots": {"frictionless": True, "undamped": True},
-    "no dashpots": {"undamped": True, "growth": 0.0},
+    "no dashpots": {"undamped": True, "growth_rate": 0.0},
     "fades": {"without_waves": Continuation.DIES},
     "lasts: quasi-harmonic": LASTS,
     "on its way: quasi-harmonic": {**LASTS, "level_without_waves": 2.0},
     "lasts, irregular: quasi-harmonic": {"without_waves": Continuation.LASTS},
-    "comes and goes": {"change": math.nan, "change_error": math.nan},
-    "undecided": {"change": 0.5},
+    "comes and goes": {"level_change": math.nan, "level_change_error": math.nan},
+    "undecided": {"level_change": 0.5},
 }
 ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "failed": {"failure": "it broke"},
-    "shorter than a wave": {"slowest": 11.0},
-    "linear, held by the steps": {"linear": True, "growth": 1.0, "steadier": "take half weights"},
+    "shorter than a wave": {"slowest_wave_period": 11.0},
+    "linear, held by the steps": {"linear": True, "growth_rate": 1.0, "steadier": "take half weights"},
     "linear, forced": {"linear": True},
-    "linear, grows": {"linear": True, "growth": 1.0, "to_limit": 3.0},
-    "linear, open": {"linear": True, "growth_error": 2.0},
+    "linear, grows": {"linear": True, "growth_rate": 1.0, "time_to_limit": 3.0},
+    "linear, open": {"linear": True, "growth_rate_error": 2.0},
     "forced, no friction": {"frictionless": True},
     "no friction, no dashpots": {"frictionless": True, "undamped": True},
-    "bounces": {"touches": False},
-    "forced, neighbours": {**FADING, "without_waves": Continuation.DIES, "change": 0.5},
-    "forced, level": {"without_waves": Continuation.DIES, "change": -0.5, "power_of_friction": 0.1},
+    "bounces": {"touches_in_sliding": False},
+    "forced, neighbours": {**FADING, "without_waves": Continuation.DIES, "level_change": 0.5},
+    "forced, level": {"without_waves": Continuation.DIES, "level_change": -0.5, "power_of_friction": 0.1},
     "forced, friction takes": {"power_of_friction": -1.0, "power_of_roughness": 2.0},
     "forced, roughness gives": {**FADING, "power_of_roughness": 3.0},
     "forced, another level": {**FADING, **LASTS, "level_without_waves": 2.0},
-    "dies out, not yet": {"without_waves": Continuation.DIES, "change": 0.5},
+    "dies out, not yet": {"without_waves": Continuation.DIES, "level_change": 0.5},
     "no dashpots, rough": {"undamped": True},
     "self-excited: quasi-harmonic": LASTS,
     "locked to the waves: quasi-harmonic": {**FADING, **LASTS},
-    "comes and goes": {"change": math.nan, "change_error": math.nan},
-    "kept up by friction: quasi-harmonic": {**LASTS, "exponent": -0.1},
-    "still changes": {"change": 0.5},
-    "energy still changes": {"power_left": 1.0},
-    "phase not known": {"exponent": -0.1},
+    "comes and goes": {"level_change": math.nan, "level_change_error": math.nan},
+    "kept up by friction: quasi-harmonic": {**LASTS, "lyapunov_exponent": -0.1},
+    "still changes": {"level_change": 0.5},
+    "energy still changes": {"power_stored": 1.0},
+    "phase not known": {"lyapunov_exponent": -0.1},
     "either": {},
 }
 LOOK_ROWS: dict[str, dict[str, Any]] = {
     "limit cycle with stick": {"sticks_without_waves": 1.0, "period_without_waves": 0.01},
     "limit cycle without stick": {"sticks_without_waves": 0.0, "period_without_waves": 0.01},
-    "on its way": {**SHAKEN, "growth": 1.0, "change": 0.5},
+    "on its way": {**SHAKEN, "growth_rate": 1.0, "level_change": 0.5},
     "few cycles": {"cycles": 9.0},
     "few steps in a cycle": {"steps_per_cycle": 7.0},
     "few samples in a cycle": {"samples_per_cycle": 7.0},
-    "shorter than two waves": {"slowest": 3.0},
+    "shorter than two waves": {"slowest_wave_period": 3.0},
     "relaxation": {"stick_cycles": 0.9},
     "quasi-harmonic": {},
     "irregular": {"stick_cycles": 0.5},
@@ -164,13 +184,13 @@ def test_no_sentence_has_a_number_that_is_not_known() -> None:
         (
             "settled_within",
             0.3,
-            {"change": 0.5, "without_waves": Continuation.LASTS},
+            {"level_change": 0.5, "without_waves": Continuation.LASTS},
             ("undecided", "lasts, irregular"),
         ),
         (
             "sure_errors",
             60.0,
-            {"change": 0.5, "without_waves": Continuation.LASTS},
+            {"level_change": 0.5, "without_waves": Continuation.LASTS},
             ("undecided", "lasts, irregular"),
         ),
         ("same_level", 0.6, {**LASTS, "level_without_waves": 2.0}, ("on its way", "lasts")),
@@ -201,7 +221,7 @@ def test_what_still_grows_on_a_rough_wheel_looks_as_the_limit_cycle_to_which_it_
     sticks: float, regime: Regime
 ) -> None:
     """Its own cycles are those of a transient."""
-    changes = {**SHAKEN, **LASTS, "growth": 1.0, "change": 0.5, "stick_cycles": 1.0 - sticks}
+    changes = {**SHAKEN, **LASTS, "growth_rate": 1.0, "level_change": 0.5, "stick_cycles": 1.0 - sticks}
     assert decide(answers(**changes), LIMITS).row == "self-excited: on its way"
     known = {"sticks_without_waves": sticks, "period_without_waves": 0.01}
     assert decide(answers(**changes, **known), LIMITS).regime is regime
@@ -210,7 +230,11 @@ def test_what_still_grows_on_a_rough_wheel_looks_as_the_limit_cycle_to_which_it_
 @pytest.mark.parametrize(
     "changes",
     [
-        {**LASTS, "exponent": -0.08, "power_of_roughness": 1.0},  # together, but by less than a power of e
+        {
+            **LASTS,
+            "lyapunov_exponent": -0.08,
+            "power_of_roughness": 1.0,
+        },  # together, but by less than a power of e
         {**LASTS, "level_without_waves": 2.0},  # sliding is stable, and may be what the waves shake
         {"without_waves": Continuation.DIES},  # and yet friction keeps it up, with a phase of its own
     ],
@@ -223,26 +247,43 @@ def test_what_shows_neither_a_phase_of_its_own_nor_that_waves_lead_is_undecided(
     ("changes", "row"),
     [
         (
-            {"exponent": -0.04, "exponent_error": 0.02},
+            {"lyapunov_exponent": -0.04, "lyapunov_error": 0.02},
             "self-excited",
         ),  # 0 within its errors, and never a power of e
         (
-            {"exponent": -0.7, "exponent_error": 0.4},
+            {"lyapunov_exponent": -0.7, "lyapunov_error": 0.4},
             "phase not known",
         ),  # no proof that they come together, nor that not
-        ({"exponent": 0.3, "exponent_error": 0.4}, "phase not known"),
-        ({"exponent": 0.3, "exponent_error": 0.05}, "self-excited"),  # chaos
-        ({"exponent": 0.0, "exponent_error": math.inf}, "either"),
-        ({"exponent": math.nan, "exponent_error": math.nan}, "either"),
-        ({"exponent": -0.7, "exponent_error": 0.4, "even": -0.8, "even_error": 0.05}, "forced, roughness gives"),
-        ({"exponent": -0.7, "exponent_error": 0.1, "even": -0.1, "even_error": 0.01}, "forced, roughness gives"),
+        ({"lyapunov_exponent": 0.3, "lyapunov_error": 0.4}, "phase not known"),
+        ({"lyapunov_exponent": 0.3, "lyapunov_error": 0.05}, "self-excited"),  # chaos
+        ({"lyapunov_exponent": 0.0, "lyapunov_error": math.inf}, "either"),
+        ({"lyapunov_exponent": math.nan, "lyapunov_error": math.nan}, "either"),
+        (
+            {
+                "lyapunov_exponent": -0.7,
+                "lyapunov_error": 0.4,
+                "lyapunov_by_line": -0.8,
+                "lyapunov_by_line_error": 0.05,
+            },
+            "forced, roughness gives",
+        ),
+        (
+            {
+                "lyapunov_exponent": -0.7,
+                "lyapunov_error": 0.1,
+                "lyapunov_by_line": -0.1,
+                "lyapunov_by_line_error": 0.01,
+            },
+            "forced, roughness gives",
+        ),
     ],
 )
 def test_what_is_not_known_of_neighbours_is_no_evidence(changes: dict[str, Any], row: str) -> None:
     """Friction gives 1 W and the roughness as much, so that powers decide nothing; or three times as much."""
     power = 3.0 if row.startswith("forced") else 1.0
     found = decide(
-        answers(**{**SHAKEN, **LASTS, "power_of_roughness": power, "even": math.nan, **changes}), LIMITS
+        answers(**{**SHAKEN, **LASTS, "power_of_roughness": power, "lyapunov_by_line": math.nan, **changes}),
+        LIMITS,
     )
     assert found.row.partition(":")[0] == row
     assert not {"nan", "inf"} & set(found.sentence.replace(";", " ").split())
@@ -254,22 +295,22 @@ def test_what_is_not_known_of_neighbours_is_no_evidence(changes: dict[str, Any],
 )
 def test_no_row_rests_on_powers_that_do_not_balance(row: str, left: float) -> None:
     """What friction and the roughness give, dashpots take: what is left is as large as both."""
-    given = answers(**{**SHAKEN, **ROUGH_ROWS[row], "change": 0.0, "power_left": left})
+    given = answers(**{**SHAKEN, **ROUGH_ROWS[row], "level_change": 0.0, "power_stored": left})
     assert decide(given, LIMITS).regime is Regime.UNDECIDED
 
 
 def test_where_dashpots_take_more_than_is_given_friction_does_not_keep_it_up() -> None:
     row, left = FALLS
-    falls = answers(**{**SHAKEN, **ROUGH_ROWS[row], "change": 0.0, "power_left": left})
+    falls = answers(**{**SHAKEN, **ROUGH_ROWS[row], "level_change": 0.0, "power_stored": left})
     assert decide(falls, LIMITS).row == row
 
 
 @pytest.mark.parametrize("error", [0.1, 0.3])
 def test_what_surely_takes_energy_gives_none_of_it(error: float) -> None:
     """Twice what it may give is asked of the other: 1 W that is taken within 0.3 W of three errors is none."""
-    shaken = {**SHAKEN, "power_of_roughness": 1.0, "power_of_friction": -1.0, "friction_error": error}
+    shaken = {**SHAKEN, "power_of_roughness": 1.0, "power_of_friction": -1.0, "power_of_friction_error": error}
     assert decide(answers(**shaken), LIMITS).row == "forced, friction takes"
-    locked = {**SHAKEN, **FADING, **LASTS, "power_of_roughness": -1.0, "roughness_error": error}
+    locked = {**SHAKEN, **FADING, **LASTS, "power_of_roughness": -1.0, "power_of_roughness_error": error}
     assert decide(answers(**locked), LIMITS).row == "locked to the waves: quasi-harmonic"
 
 
@@ -279,10 +320,10 @@ def test_where_waves_surely_take_energy_friction_gives_what_lasts(
     roughness: float, row: str, undamped: bool
 ) -> None:
     """Its own power is known to 0.9 W, that of the waves to 0.3 W: nothing else gives, also without dashpots."""
-    unsure = {"power_of_friction": 0.6, "friction_error": 0.3, "power_of_roughness": roughness}
-    given = {**SHAKEN, **LASTS, **unsure, "undamped": undamped, "growth": 1.0}
+    unsure = {"power_of_friction": 0.6, "power_of_friction_error": 0.3, "power_of_roughness": roughness}
+    given = {**SHAKEN, **LASTS, **unsure, "undamped": undamped, "growth_rate": 1.0}
     assert decide(answers(**given), LIMITS).row == row
-    falls = {**given, "change": -0.5}
+    falls = {**given, "level_change": -0.5}
     assert decide(answers(**falls), LIMITS).regime is Regime.UNDECIDED
 
 
@@ -291,8 +332,14 @@ def test_where_waves_surely_take_energy_friction_gives_what_lasts(
 )
 def test_waves_are_idle_beside_the_power_of_the_settled_motion(left: float, row: str) -> None:
     """0.035 W are less than a twentieth of 1 W that friction gives, not of 0.6 W where 0.4 W are stored."""
-    idle = {**SHAKEN, **LASTS, "exponent": -0.1, "level_without_waves": math.nan, "power_of_roughness": 0.035}
-    powers = {"friction_error": 1e-3, "roughness_error": 1e-6, "power_left": left}
+    idle = {
+        **SHAKEN,
+        **LASTS,
+        "lyapunov_exponent": -0.1,
+        "level_without_waves": math.nan,
+        "power_of_roughness": 0.035,
+    }
+    powers = {"power_of_friction_error": 1e-3, "power_of_roughness_error": 1e-6, "power_stored": left}
     assert decide(answers(**{**idle, **powers}), LIMITS).row == row
 
 
@@ -321,7 +368,7 @@ def test_where_theory_does_not_know_the_growth_neighbours_decide_and_say_how_fas
         (-0.4, "linear, forced", "decays at 0.4 1/s"),
         (0.4, "linear, grows", "growing at 0.4 1/s"),
     ):
-        given = answers(**{**SHAKEN, "linear": True, "growth": math.nan, "even": rate})
+        given = answers(**{**SHAKEN, "linear": True, "growth_rate": math.nan, "lyapunov_by_line": rate})
         found = decide(Answers.of(given.known()), LIMITS)
         assert found.row == row
         assert word in found.sentence
@@ -335,5 +382,5 @@ def test_a_row_whose_remedy_is_a_longer_run_says_so_to_runs_that_settle() -> Non
     assert asked < named
     assert named - asked == {"either", "nothing moves yet"}
     (rests,) = (row for row in rows if row.name == "nothing moves yet")
-    grows = Answers(growth=10.0, duration=1.0)
+    grows = Answers(growth_rate=10.0, duration=1.0)
     assert [rests.decision(grows._replace(duration=each)).longer for each in (1.0, 1e3)] == [True, False]

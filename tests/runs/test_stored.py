@@ -1,12 +1,14 @@
 """`classify` decides from the record of answers that a run has stored."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 import tomli_w
 
+from brakecli.analysis.regime.answers import RENAMED, Answers
 from brakecli.analysis.regime.decision import Thresholds
 from brakecli.case.read import parse_case
 from brakecli.runs import stored
@@ -22,14 +24,14 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return found
 
 
-def without_answers(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Files look as those of an older version do."""
+def with_evidence(monkeypatch: pytest.MonkeyPatch, of: Callable[[Mapping[str, Any]], dict[str, Any]]) -> None:
+    """Files have another record of evidence."""
     whole = stored.stored_run
 
     @contextmanager
     def older(path: Path) -> Iterator[stored.Stored]:
         with whole(path) as found:
-            yield found._replace(evidence={"envelope_final": 1.0})
+            yield found._replace(evidence=of(found.evidence))
 
     monkeypatch.setattr(stored, "stored_run", older)
 
@@ -43,11 +45,20 @@ def test_other_thresholds_decide_anew_and_the_numbers_stay(path: Path) -> None:
     assert strict["thresholds"]["comes_together"] == 1e9
 
 
+def test_answers_under_their_earlier_names_decide_as_well(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = stored.classify_result(path, Thresholds())
+    earlier = {name: before for before, name in RENAMED.items()}
+    with_evidence(monkeypatch, lambda known: {earlier.get(name, name): value for name, value in known.items()})
+    assert stored.classify_result(path, Thresholds()) == now
+    assert {*RENAMED.values()} <= {*Answers._fields}
+    assert not {*RENAMED} & {*Answers._fields}
+
+
 def test_an_older_file_is_run_again_where_that_takes_a_minute_at_most(
     path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = stored.classify_result(path, Thresholds())
-    without_answers(monkeypatch)
+    with_evidence(monkeypatch, lambda _: {"envelope_final": 1.0})  # as an older version does
     again = stored.classify_result(path, Thresholds())
     for name in ("regime", "excitation", "reasons", "settled", "frequency"):
         assert again[name] == now[name]

@@ -16,6 +16,35 @@ _MOST_TIMES = 16.0  # and at most; a choice
 _SETTLED = 1.4  # a run over its settled part, where it is told how long it has to be; a choice
 
 
+RENAMED = {
+    "stands": "wheel_stands",
+    "steady": "constant_speed_and_load",
+    "slowest": "slowest_wave_period",
+    "locks": "locking_friction",
+    "held": "held_by_link",
+    "touches": "touches_in_sliding",
+    "growth": "growth_rate",
+    "growth_error": "growth_rate_error",
+    "ringing": "ringing_frequency",
+    "never": "never_touched",
+    "lost": "contact_lost",
+    "left": "contact_left",
+    "carried": "carried_along",
+    "to_limit": "time_to_limit",
+    "change": "level_change",
+    "change_error": "level_change_error",
+    "exponent": "lyapunov_exponent",
+    "exponent_error": "lyapunov_error",
+    "even": "lyapunov_by_line",
+    "even_error": "lyapunov_by_line_error",
+    "power_left": "power_stored",
+    "friction_error": "power_of_friction_error",
+    "roughness_error": "power_of_roughness_error",
+    "seconds": "settled_duration",
+}
+"""Names of answers in results of 0.7.0 and before, and what they are called now."""
+
+
 def shown_after(duration: float, rate: float) -> float:
     """Duration (s) of a run that shows what lasts, where something changes at this rate (1/s) after so long."""
     return QUARTER * (duration + FADED / max(rate, 1e-300))
@@ -37,32 +66,32 @@ class Answers(NamedTuple):
     duration: float = math.nan
     samples: int = 0
     few_samples: bool = False  # too few for an envelope
-    steady: bool = True  # whether the wheel's speed and the load are constant
-    stands: bool = False  # whether the wheel stands
+    constant_speed_and_load: bool = True
+    wheel_stands: bool = False
     waves: bool = False  # whether the roughness of a turning wheel shakes the shoe
-    slowest: float = 0.0  # period of the slowest wave that counts
+    slowest_wave_period: float = 0.0  # period of the slowest wave that counts
     frictionless: bool = False
     undamped: bool = False
-    locks: float = math.nan  # friction coefficient from which on the shoe locks itself, where its own is larger
-    held: bool = True  # whether a link holds the shoe along the wheel
-    touches: bool = True  # whether the shoe touches the wheel where it slides steadily
-    growth: float = math.nan  # of a small disturbance of steady sliding, 1/s
-    growth_error: float = 0.0  # by which the slopes of the waves may change it
-    ringing: float = math.nan  # frequency of that disturbance
+    locking_friction: float = math.nan  # coefficient from which on the shoe locks itself, where its own is larger
+    held_by_link: bool = True  # whether a link holds the shoe along the wheel
+    touches_in_sliding: bool = True  # whether the shoe touches the wheel where it slides steadily
+    growth_rate: float = math.nan  # of a small disturbance of steady sliding, 1/s
+    growth_rate_error: float = 0.0  # by which the slopes of the waves may change it
+    ringing_frequency: float = math.nan  # frequency of that disturbance
     steadier: str = ""  # what to do where the steps damp what grows
-    never: bool = False  # the shoe has never touched the wheel
-    lost: bool = False  # no contact in the second half
-    left: bool = False  # no contact in the last quarter
-    carried: bool = False  # stick in the second half, of a standing wheel in the last quarter
+    never_touched: bool = False  # the shoe has never touched the wheel
+    contact_lost: bool = False  # no contact in the second half
+    contact_left: bool = False  # no contact in the last quarter
+    carried_along: bool = False  # stick in the second half, of a standing wheel in the last quarter
     moves: bool = True  # beyond rounding
     linear: bool = False  # slips to one side in full contact, at last
-    to_limit: float = math.nan  # time until stick or loss of contact limits what grows
-    change: float = math.nan  # of the logarithm of the level within the second half
-    change_error: float = math.nan
-    exponent: float = math.nan  # of neighbours, 1/s
-    exponent_error: float = math.nan
-    even: float = math.nan  # the same of a linear motion, by a line
-    even_error: float = math.nan
+    time_to_limit: float = math.nan  # time until stick or loss of contact limits what grows
+    level_change: float = math.nan  # of the logarithm of the level within the second half
+    level_change_error: float = math.nan
+    lyapunov_exponent: float = math.nan  # of neighbours, 1/s
+    lyapunov_error: float = math.nan
+    lyapunov_by_line: float = math.nan  # the same of a linear motion, by a line
+    lyapunov_by_line_error: float = math.nan
     without_waves: Continuation = Continuation.UNKNOWN  # of the motion on the smooth wheel
     amplitude: float = math.nan  # of x at the end
     level: float = math.nan  # standard deviation of vx there
@@ -73,10 +102,10 @@ class Answers(NamedTuple):
     sticks_without_waves: float = math.nan  # in a period
     power_of_friction: float = math.nan  # power that friction gives, W
     power_of_roughness: float = math.nan  # that the roughness gives
-    power_left: float = math.nan  # what dashpots and scheme leave of both; nothing where the motion has settled
-    friction_error: float = math.nan
-    roughness_error: float = math.nan
-    seconds: float = math.nan  # of the settled part
+    power_stored: float = math.nan  # what dashpots and scheme leave of both; nothing where the motion has settled
+    power_of_friction_error: float = math.nan
+    power_of_roughness_error: float = math.nan
+    settled_duration: float = math.nan  # of the settled part
     settled: bool = False  # whether such a part was found
     cycles: float = 0.0  # in it
     frequency: float = math.nan  # of them
@@ -111,14 +140,14 @@ class Answers(NamedTuple):
 
     def rate(self, errors: float) -> tuple[float, float]:
         """Growth rate of what a linear motion holds beside the forced one, and how far it may be off."""
-        if abs(self.growth) > self.growth_error or not math.isfinite(self.even):
-            return self.growth, self.growth_error
-        return self.even, errors * self.even_error
+        if abs(self.growth_rate) > self.growth_rate_error or not math.isfinite(self.lyapunov_by_line):
+            return self.growth_rate, self.growth_rate_error
+        return self.lyapunov_by_line, errors * self.lyapunov_by_line_error
 
     @property
     def longer(self) -> float:
         """Duration after which a change has come to its end: its last quarter is judged."""
-        return shown_after(self.duration, abs(self.change) / (0.5 * self.duration))
+        return shown_after(self.duration, abs(self.level_change) / (0.5 * self.duration))
 
     @property
     def own(self) -> float:
@@ -128,18 +157,18 @@ class Answers(NamedTuple):
     @property
     def grown(self) -> float:
         """Duration after which what grows has come to its limits."""
-        limit = self.to_limit if math.isfinite(self.to_limit) else 0.0
+        limit = self.time_to_limit if math.isfinite(self.time_to_limit) else 0.0
         return shown_after(self.duration + limit, self.own)
 
     @property
     def waited(self) -> float:
         """Duration after which neighbours have come together."""
-        return shown_after(self.duration, abs(self.exponent))
+        return shown_after(self.duration, abs(self.lyapunov_exponent))
 
     @property
     def told_apart(self) -> float:
         """Duration after which an exponent is told from 0, as its error falls with the square root of the time."""
-        errors = _TOLD * self.exponent_error / max(abs(self.exponent), 1e-300)
+        errors = _TOLD * self.lyapunov_error / max(abs(self.lyapunov_exponent), 1e-300)
         times = min(errors, math.sqrt(_MOST_TIMES)) ** 2
         return QUARTER * self.duration * max(times, _TWICE)
 
@@ -169,7 +198,7 @@ class Answers(NamedTuple):
     @property
     def two_waves(self) -> float:
         """Duration whose settled part holds two periods of the slowest wave."""
-        return 2.0 * _SETTLED * self.slowest
+        return 2.0 * _SETTLED * self.slowest_wave_period
 
     @property
     def lines(self) -> str:
@@ -193,10 +222,10 @@ class Answers(NamedTuple):
     @property
     def or_longer(self) -> str:
         """How long it takes to grow from rounding to the size of a motion, if that is longer than the run."""
-        seconds = _ROUNDING / self.growth
+        seconds = _ROUNDING / self.growth_rate
         return f", or run at least {seconds:.2g} s" if seconds > self.duration else ""
 
     @property
     def word(self) -> str:
         """Which way the level changes."""
-        return "grows" if self.change > 0.0 else "falls"
+        return "grows" if self.level_change > 0.0 else "falls"

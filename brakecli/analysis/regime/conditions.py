@@ -8,7 +8,9 @@ from brakecli.analysis.regime.decision import Thresholds
 
 def steady(motion: Answers, limits: Thresholds) -> bool:
     """The level does not change, but for chance."""
-    return abs(motion.change) <= max(limits.sure_errors * motion.change_error, 2.0 * limits.settled_within)
+    return abs(motion.level_change) <= max(
+        limits.sure_errors * motion.level_change_error, 2.0 * limits.settled_within
+    )
 
 
 def _neighbours(motion: Answers, limits: Thresholds) -> tuple[float, float]:
@@ -17,11 +19,15 @@ def _neighbours(motion: Answers, limits: Thresholds) -> tuple[float, float]:
     A line through the logarithms knows them better where they swing, and worse where they wander: it counts where
     the growth itself lies within its error of it.
     """
-    rate = motion.exponent
-    error = motion.exponent_error
-    if math.isfinite(error) and motion.even_error < error and abs(motion.even - rate) <= error:
-        rate = motion.even
-        error = motion.even_error
+    rate = motion.lyapunov_exponent
+    error = motion.lyapunov_error
+    if (
+        math.isfinite(error)
+        and motion.lyapunov_by_line_error < error
+        and abs(motion.lyapunov_by_line - rate) <= error
+    ):
+        rate = motion.lyapunov_by_line
+        error = motion.lyapunov_by_line_error
     return motion.powers(rate), limits.sure_errors * motion.powers(error)
 
 
@@ -60,19 +66,26 @@ def gives(motion: Answers, limits: Thresholds) -> bool:
 
     Where the waves surely take energy from a level that stays, nothing but friction is left to give it.
     """
-    alone = steady(motion, limits) and motion.power_of_roughness < -limits.sure_errors * motion.roughness_error
-    return alone or motion.power_of_friction > limits.sure_errors * motion.friction_error
+    alone = (
+        steady(motion, limits)
+        and motion.power_of_roughness < -limits.sure_errors * motion.power_of_roughness_error
+    )
+    return alone or motion.power_of_friction > limits.sure_errors * motion.power_of_friction_error
 
 
 def takes(motion: Answers, limits: Thresholds) -> bool:
     """Friction surely takes energy: more than is set free as the motion falls."""
-    return motion.power_of_friction + abs(motion.power_left) < -limits.sure_errors * motion.friction_error
+    return (
+        motion.power_of_friction + abs(motion.power_stored) < -limits.sure_errors * motion.power_of_friction_error
+    )
 
 
 def friction_gives_most(motion: Answers, limits: Thresholds) -> bool:
     """Friction gives most of the energy, also of what is stored or set free."""
-    friction = motion.power_of_friction, motion.friction_error
-    return _gives_most(friction, (motion.power_of_roughness, motion.roughness_error), motion.power_left, limits)
+    friction = motion.power_of_friction, motion.power_of_friction_error
+    return _gives_most(
+        friction, (motion.power_of_roughness, motion.power_of_roughness_error), motion.power_stored, limits
+    )
 
 
 def friction_gives_less(motion: Answers, limits: Thresholds) -> bool:
@@ -80,20 +93,24 @@ def friction_gives_less(motion: Answers, limits: Thresholds) -> bool:
 
     Powers balance, or dashpots take more than both give: what falls so is kept up by nothing.
     """
-    return (balances(motion, limits) or motion.power_left < 0.0) and not friction_gives_most(motion, limits)
+    return (balances(motion, limits) or motion.power_stored < 0.0) and not friction_gives_most(motion, limits)
 
 
 def roughness_is_idle(motion: Answers, limits: Thresholds) -> bool:
     """The waves neither give energy nor take it, but for a part that is lost in a settled level."""
-    error = limits.sure_errors * math.hypot(motion.roughness_error, limits.settled_within * motion.friction_error)
-    lost = limits.settled_within * (motion.power_of_friction - abs(motion.power_left))
+    error = limits.sure_errors * math.hypot(
+        motion.power_of_roughness_error, limits.settled_within * motion.power_of_friction_error
+    )
+    lost = limits.settled_within * (motion.power_of_friction - abs(motion.power_stored))
     return abs(motion.power_of_roughness) + error < lost
 
 
 def roughness_gives_most(motion: Answers, limits: Thresholds) -> bool:
     """The waves give most of the energy, also of what is stored or set free."""
-    roughness = motion.power_of_roughness, motion.roughness_error
-    return _gives_most(roughness, (motion.power_of_friction, motion.friction_error), motion.power_left, limits)
+    roughness = motion.power_of_roughness, motion.power_of_roughness_error
+    return _gives_most(
+        roughness, (motion.power_of_friction, motion.power_of_friction_error), motion.power_stored, limits
+    )
 
 
 def _gives_most(one: tuple[float, float], other: tuple[float, float], left: float, limits: Thresholds) -> bool:
@@ -115,10 +132,10 @@ def balances(motion: Answers, limits: Thresholds) -> bool:
 
     A level that is called settled may change by a part of itself, and what is stored with it.
     """
-    error = limits.sure_errors * math.hypot(motion.friction_error, motion.roughness_error)
+    error = limits.sure_errors * math.hypot(motion.power_of_friction_error, motion.power_of_roughness_error)
     drift = limits.settled_within * max(abs(motion.power_of_friction), abs(motion.power_of_roughness))
-    return abs(motion.power_left) <= max(error, drift) or (
-        not steady(motion, limits) and math.isfinite(motion.power_left)
+    return abs(motion.power_stored) <= max(error, drift) or (
+        not steady(motion, limits) and math.isfinite(motion.power_stored)
     )
 
 

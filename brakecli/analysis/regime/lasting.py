@@ -68,7 +68,7 @@ def _lasting(
         found = _self_excited(shown, answers, shown.cycles)
     else:
         part = shown.part(shown.half) if answers.linear else shown.judged
-        stays = not answers.moves or answers.carried  # all else dies, or is not known
+        stays = not answers.moves or answers.carried_along  # all else dies, or is not known
         damped = decision.regime is Regime.DAMPED
         return Lasting(part, answers.settled and stays, shown.seen.final if damped else part.amplitude("x"))
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
@@ -108,9 +108,9 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
     part = shown.judged
     interval = shown.history.interval
     history = shown.history
-    rate = -answers.exponent if math.isfinite(answers.exponent) else -shown.context.growth()
+    rate = -answers.lyapunov_exponent if math.isfinite(answers.lyapunov_exponent) else -shown.context.growth()
     fading = 0.25 * shown.duration * rate < RELAXED  # too slowly to be seen within a quarter of the run
-    chaos = math.isfinite(answers.exponent) and answers.exponent > 0.0
+    chaos = math.isfinite(answers.lyapunov_exponent) and answers.lyapunov_exponent > 0.0
     found = Lasting(part, answers.settled, 0.0)
     if not found.settled and not fading:
         found.settled = shown.changes() <= shown.limits.settled_within
@@ -170,9 +170,9 @@ def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
 def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     """A vibration that lasts by itself: medians of its cycles, with what a drift becomes in the spreads."""
     part = shown.judged
-    seconds = answers.seconds
+    seconds = answers.settled_duration
     interval = shown.history.interval
-    rate = 0.0 if answers.undamped else min(abs(answers.growth), shown.context.settles)
+    rate = 0.0 if answers.undamped else min(abs(answers.growth_rate), shown.context.settles)
     if math.isfinite(answers.rate_without_waves):
         rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
     shift = cycles.kick * cycles.frequency / rate if rate > 0.0 else 0.0
@@ -220,7 +220,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
         found.frequency, width = part.strongest
         found.evidence |= {"frequency_spread": width, **in_lines(part, found.frequency)}
-    short = seconds < shown.slowest(0.0) or abs(answers.change) > shown.limits.settled_within
+    short = seconds < shown.slowest(0.0) or abs(answers.level_change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends
         found.spread = held(
             cycles.amplitude_spread + _IMPACT_AMPLITUDE_ERROR * shift * cycles.amplitude,

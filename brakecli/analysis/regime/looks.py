@@ -12,7 +12,7 @@ LOOKS: tuple[Row[Answers, Thresholds], ...] = (
         lambda motion, limits: (
             not motion.cycles or motion.cycles < (1.0 if motion.settled else _UNSETTLED) * limits.fewest_cycles
         ),
-        "but only {cycles:.0f} cycles[ in {seconds:.3g} s]",
+        "but only {cycles:.0f} cycles[ in {settled_duration:.3g} s]",
         "run longer",
         longer=True,
     ),
@@ -30,8 +30,8 @@ LOOKS: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "shorter than two waves",
-        lambda motion, limits: motion.seconds < 2.0 * motion.slowest,
-        "but the settled part holds less than two periods of the slowest wave, {slowest:.3g} s",
+        lambda motion, limits: motion.settled_duration < 2.0 * motion.slowest_wave_period,
+        "but the settled part holds less than two periods of the slowest wave, {slowest_wave_period:.3g} s",
         "run at least {two_waves:.3g} s",
         longer=True,
     ),
@@ -54,7 +54,7 @@ LOOKS: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "on its way",
         lambda motion, limits: motion.waves and not steady(motion, limits),
-        "but its level still {word} by e^{change:.2g} in the second half, which changes how it looks",
+        "but its level still {word} by e^{level_change:.2g} in the second half, which changes how it looks",
         "run at least {longer:.3g} s",
         longer=True,
     ),

@@ -158,9 +158,9 @@ class Shown:
         return {
             "power_of_friction": friction,
             "power_of_roughness": roughness,
-            "power_left": left,
-            "friction_error": max(friction_error, closing),
-            "roughness_error": max(roughness_error, closing),
+            "power_stored": left,
+            "power_of_friction_error": max(friction_error, closing),
+            "power_of_roughness_error": max(roughness_error, closing),
         }
 
 
@@ -185,42 +185,46 @@ def answers(shown: Shown) -> Answers:
         "duration": shown.duration,
         "samples": shown.samples,
         "few_samples": shown.samples < FEWEST_SAMPLES,
-        "steady": context.steady,
-        "stands": stands,
+        "constant_speed_and_load": context.steady,
+        "wheel_stands": stands,
         "waves": waves,
         "frictionless": context.frictionless,
         "undamped": context.undamped,
-        "locks": math.nan if context.locks is None else context.locks,
-        "held": context.held,
-        "never": shown.stays(ContactState.SEPARATED, 0),
-        "lost": shown.stays(ContactState.SEPARATED, shown.half),
-        "left": shown.stays(ContactState.SEPARATED, shown.quarter),
-        "carried": shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
+        "locking_friction": math.nan if context.locks is None else context.locks,
+        "held_by_link": context.held,
+        "never_touched": shown.stays(ContactState.SEPARATED, 0),
+        "contact_lost": shown.stays(ContactState.SEPARATED, shown.half),
+        "contact_left": shown.stays(ContactState.SEPARATED, shown.quarter),
+        "carried_along": shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
     }
     if exponent is not None:
-        found |= {"exponent": exponent.rate, "even": exponent.even, "even_error": exponent.even_error}
+        found |= {
+            "lyapunov_exponent": exponent.rate,
+            "lyapunov_by_line": exponent.even,
+            "lyapunov_by_line_error": exponent.even_error,
+        }
     if shown.brief:
         return Answers(**found)
     found |= {
         "moves": seen.largest_level > context.quiet,
-        "slowest": shown.slowest(seen.swing),
-        "change": seen.change,
-        "change_error": seen.change_error,
+        "slowest_wave_period": shown.slowest(seen.swing),
+        "level_change": seen.change,
+        "level_change_error": seen.change_error,
         "amplitude": seen.amplitude,
         "level": seen.level,
         "settled": seen.settled_from > 0,
-        "seconds": (shown.samples - shown.judged_from) * shown.interval,
+        "settled_duration": (shown.samples - shown.judged_from) * shown.interval,
     }
     if exponent is not None:
         drift = 0.0 if found["settled"] else shown.drift()
         passing = 0.0 if _lasts(shown, Answers(**found)) else max(exponent.rate, 0.0)  # what grows on the way only
-        found["exponent_error"] = math.hypot(exponent.error, drift, passing)
+        found["lyapunov_error"] = math.hypot(exponent.error, drift, passing)
     if (theory := shown.linear) is not None:
-        found |= {"linear": True, "ringing": theory.mode.frequency}
+        found |= {"linear": True, "ringing_frequency": theory.mode.frequency}
         if math.isfinite(theory.known_to):  # otherwise only neighbours tell
-            found |= {"growth": theory.mode.growth, "growth_error": theory.known_to}
+            found |= {"growth_rate": theory.mode.growth, "growth_rate_error": theory.known_to}
         if theory.direction > 0:
-            found |= {"to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
+            found |= {"time_to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
     else:
         found |= _of_more(shown, waves)
     return Answers(**found)
@@ -230,19 +234,19 @@ def _lasts(shown: Shown, found: Answers) -> bool:
     """Whether disturbances will grow as they do: they fade from a linear motion, or the level surely stays."""
     theory = shown.linear
     fades = theory is not None and theory.direction < 0
-    return fades or abs(found.change) <= shown.limits.sure_errors * found.change_error
+    return fades or abs(found.level_change) <= shown.limits.sure_errors * found.level_change_error
 
 
 def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
     """What has to be known of a motion that is not linear."""
     context = shown.context
-    found = dict[str, Any](growth=shown.context.growth())
+    found = dict[str, Any](growth_rate=shown.context.growth())
     if not context.frictionless:
         alone = shown.given.continued()
         names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))
         found |= dict(zip(names, alone, strict=True))
     if waves:
-        found |= shown.powers() | {"touches": context.touches()}
+        found |= shown.powers() | {"touches_in_sliding": context.touches()}
     if cycles := shown.cycles:
         names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
         found |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}

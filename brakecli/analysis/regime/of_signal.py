@@ -122,7 +122,7 @@ def _of_bursts(signal: Signal, known: _Known, whole: SignalVerdict) -> SignalVer
         part = replace(signal, values=signal.values[begin + margin : end - margin])
         inside = _judge(part, *known).verdict if np.isfinite(part.values).any() else whole
         sustained = inside.regime in _SUSTAINED and inside.evidence["steady_from"] == 0.0
-        if sustained and abs(inside.evidence["change"]) < _LEVEL:
+        if sustained and abs(inside.evidence["level_change"]) < _LEVEL:
             line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
             said = (f"{when}: {inside.reasons[0]}",)
             return replace(inside, reasons=said, frequency=line, bursts=tones, warnings=whole.warnings)

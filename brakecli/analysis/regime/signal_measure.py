@@ -87,7 +87,7 @@ class Heard:
                 break
         was_loud = bool(levels[: windows // 2].max() >= largest)
         found = {"died_to": died_to, "hidden": hidden, "was_loud": was_loud}
-        return {**found, "steady_from": steady_from, "change": change, "change_error": error}
+        return {**found, "steady_from": steady_from, "level_change": change, "level_change_error": error}
 
     def harmony(self) -> dict[str, float]:
         """Parts of the energy that tell lines in step from stick."""

@@ -44,8 +44,8 @@ class SignalAnswers:
     hidden: float = math.nan  # part of the largest level that noise hides
     was_loud: bool = False  # whether the largest level lies in the first half
     steady_from: float = math.nan  # part of the record from which on the change is that of the level: 0 or 1/2
-    change: float = math.nan  # of its logarithm
-    change_error: float = math.nan
+    level_change: float = math.nan  # of its logarithm
+    level_change_error: float = math.nan
     skewness: float = math.nan  # of the velocity
     events: float = math.nan  # of what skews it
     slip_lasts: float = math.nan  # part of a slip that is left a quarter of a cycle later
@@ -62,7 +62,7 @@ class SignalAnswers:
     @property
     def word(self) -> str:
         """Which way the level changes."""
-        return "grows" if self.change > 0.0 else "falls"
+        return "grows" if self.level_change > 0.0 else "falls"
 
     @property
     def unseen(self) -> str:
@@ -136,8 +136,8 @@ ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
     ),
     Row(
         "still changes",
-        lambda motion, limits: not steady(motion.change, motion.change_error, limits),
-        "the level {word} by e^{change:.2g} in the second half",
+        lambda motion, limits: not steady(motion.level_change, motion.level_change_error, limits),
+        "the level {word} by e^{level_change:.2g} in the second half",
         "measure longer, until it does not",
     ),
     Row(

@@ -32,9 +32,9 @@ _CHECK = "check load.force, and the angles of the links"
 _LINEAR = "full contact and slip to one side make the motion linear"
 _SOURCES = (
     "[of its power friction gives {power_of_friction:.2g} W and the roughness {power_of_roughness:.2g} W; ]"
-    "[neighbours change at {exponent:.2g} 1/s; ]without the roughness {becomes}"
+    "[neighbours change at {lyapunov_exponent:.2g} 1/s; ]without the roughness {becomes}"
 )
-_DECAYS = _LINEAR + ": the shoe's own vibration decays at {decay:.3g} 1/s ({ringing:.4g} Hz)"
+_DECAYS = _LINEAR + ": the shoe's own vibration decays at {decay:.3g} 1/s ({ringing_frequency:.4g} Hz)"
 
 CONTACT: tuple[Row[Answers, Thresholds], ...] = (
     Row("failed", lambda motion, limits: motion.failure, "the run failed: {failure}"),
@@ -44,38 +44,45 @@ CONTACT: tuple[Row[Answers, Thresholds], ...] = (
         "the file is older than the questions that decide",
         "{unasked}",
     ),
-    Row("never touched", lambda motion, limits: motion.never, "the shoe has never touched the wheel", _CHECK),
-    Row("lost", lambda motion, limits: motion.lost, "the shoe has lost contact for good", _CHECK),
+    Row(
+        "never touched",
+        lambda motion, limits: motion.never_touched,
+        "the shoe has never touched the wheel",
+        _CHECK,
+    ),
+    Row("lost", lambda motion, limits: motion.contact_lost, "the shoe has lost contact for good", _CHECK),
     Row(
         "left",
-        lambda motion, limits: motion.left,
+        lambda motion, limits: motion.contact_left,
         "the shoe has left the wheel",
         "run longer, to see whether it comes back",
         longer=True,
     ),
     Row(
         "at rest",
-        lambda motion, limits: motion.carried and motion.stands,
+        lambda motion, limits: motion.carried_along and motion.wheel_stands,
         "the shoe has come to rest, sticking to the standing wheel",
         "",
         _DAMPED,
     ),
     Row(
         "not held",
-        lambda motion, limits: motion.carried and not motion.held,
+        lambda motion, limits: motion.carried_along and not motion.held_by_link,
         "the shoe sticks throughout and is carried along by the wheel: no link holds it along the wheel",
         "incline a link, by its angle_deg",
     ),
     Row(
         "locks itself",
-        lambda motion, limits: motion.carried and motion.steady and math.isfinite(motion.locks),
+        lambda motion, limits: (
+            motion.carried_along and motion.constant_speed_and_load and math.isfinite(motion.locking_friction)
+        ),
         "the shoe sticks throughout and is carried along by the wheel: it locks itself, as friction grows faster "
         "with x than the force that it needs, so that no longer run will see it slip",
-        "it slips below a friction coefficient of {locks:.4g}",
+        "it slips below a friction coefficient of {locking_friction:.4g}",
     ),
     Row(
         "carried",
-        lambda motion, limits: motion.carried,
+        lambda motion, limits: motion.carried_along,
         "the shoe sticks throughout and is carried along by the wheel",
         "run longer",
         longer=True,
@@ -89,13 +96,13 @@ CONTACT: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "changes",
-        lambda motion, limits: not motion.steady,
+        lambda motion, limits: not motion.constant_speed_and_load,
         "the wheel's speed or the load changes with time, so the motion cannot settle",
     ),
     Row(
         "nothing moves yet",
-        lambda motion, limits: not motion.moves and motion.growth > 0.0,
-        "nothing moves yet, but sliding is unstable: a disturbance grows at {growth:.3g} 1/s",
+        lambda motion, limits: not motion.moves and motion.growth_rate > 0.0,
+        "nothing moves yet, but sliding is unstable: a disturbance grows at {growth_rate:.3g} 1/s",
         "start beside steady sliding{or_longer}",
         longer=lambda motion: motion.or_longer,
     ),
@@ -108,21 +115,21 @@ CONTACT: tuple[Row[Answers, Thresholds], ...] = (
     ),
     Row(
         "standing wheel",
-        lambda motion, limits: motion.stands and not motion.undamped,
+        lambda motion, limits: motion.wheel_stands and not motion.undamped,
         "the wheel stands: friction and dashpots take the energy",
         "",
         _DAMPED,
     ),
     Row(
         "standing wheel, no dashpots",
-        lambda motion, limits: motion.stands,
+        lambda motion, limits: motion.wheel_stands,
         "the wheel stands, but no dashpot damps",
         _DASHPOT,
     ),
 )
 COMES_AND_GOES: Row[Answers, Thresholds] = Row(
     "comes and goes",
-    lambda motion, limits: not math.isfinite(motion.change),
+    lambda motion, limits: not math.isfinite(motion.level_change),
     "the motion comes and goes: in a part of the second half nothing moves",
     "run longer",
     longer=True,
@@ -136,7 +143,7 @@ _HELD: Row[Answers, Thresholds] = Row(
 _GROWS: Row[Answers, Thresholds] = Row(
     "linear, grows",
     lambda motion, limits: motion.linear and grows(motion, limits),
-    _LINEAR + ": still growing at {own:.3g} 1/s ({ringing:.4g} Hz)",
+    _LINEAR + ": still growing at {own:.3g} 1/s ({ringing_frequency:.4g} Hz)",
     "run at least {grown:.3g} s",
     longer=True,
 )
@@ -172,7 +179,7 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     _NO_DASHPOTS,
     Row(
         "no dashpots",
-        lambda motion, limits: motion.undamped and not motion.growth > 0.0,
+        lambda motion, limits: motion.undamped and not motion.growth_rate > 0.0,
         "sliding is stable, and no dashpot makes a large vibration settle",
         _DASHPOT,
     ),
@@ -210,7 +217,7 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "undecided",
         lambda motion, limits: True,
-        "[the level {word} by e^{change:.2g} in the second half, and ]what it comes to is not known",
+        "[the level {word} by e^{level_change:.2g} in the second half, and ]what it comes to is not known",
         "run at least {longer:.3g} s",
         longer=True,
     ),
@@ -218,8 +225,8 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
 ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "shorter than a wave",
-        lambda motion, limits: motion.duration < motion.slowest,
-        "the run is shorter than the period of the slowest wave, {slowest:.3g} s",
+        lambda motion, limits: motion.duration < motion.slowest_wave_period,
+        "the run is shorter than the period of the slowest wave, {slowest_wave_period:.3g} s",
         "run at least {two_waves:.3g} s",
         longer=True,
     ),
@@ -235,7 +242,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "linear, open",
         lambda motion, limits: motion.linear,
-        _LINEAR + ": neighbours neither come together nor part surely[, at {even:.2g} ± {even_error:.1g} 1/s]",
+        _LINEAR + ": neighbours neither come together nor part surely"
+        "[, at {lyapunov_by_line:.2g} ± {lyapunov_by_line_error:.1g} 1/s]",
         "run longer; without dashpots, " + _DASHPOT,
         longer=True,
     ),
@@ -249,7 +257,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     _NO_DASHPOTS,
     Row(
         "bounces",
-        lambda motion, limits: not motion.touches,
+        lambda motion, limits: not motion.touches_in_sliding,
         "sliding steadily the shoe would not touch the wheel: it bounces, and may leave it for good",
         _CHECK,
     ),
@@ -257,7 +265,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "forced, neighbours",
         lambda motion, limits: motion.without_waves == Continuation.DIES and together(motion, limits),
         "only the roughness shakes the shoe: without it the vibration dies out, and small disturbances "
-        "have a growth rate of {exponent:.3g} 1/s",
+        "have a growth rate of {lyapunov_exponent:.3g} 1/s",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
@@ -265,7 +273,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         "forced, level",
         lambda motion, limits: (
             motion.without_waves == Continuation.DIES
-            and (steady(motion, limits) or motion.change < 0.0)
+            and (steady(motion, limits) or motion.level_change < 0.0)
             and friction_gives_less(motion, limits)
             and not motion.undamped
         ),
@@ -295,7 +303,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and not motion.undamped
         ),
         "only the roughness shakes the shoe: it gives {power_of_roughness:.2g} W, friction "
-        "{power_of_friction:.2g} W, and small disturbances have a growth rate of {exponent:.3g} 1/s",
+        "{power_of_friction:.2g} W, and small disturbances have a growth rate of {lyapunov_exponent:.3g} 1/s",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
@@ -304,23 +312,23 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         lambda motion, limits: (
             together(motion, limits) and steady(motion, limits) and another(motion, limits) and not motion.undamped
         ),
-        "only the roughness shakes the shoe: small disturbances have a growth rate of {exponent:.3g} 1/s, and "
-        "vx has {level:.3g} m/s, not the {level_without_waves:.3g} m/s to which it would come without the "
-        "roughness",
+        "only the roughness shakes the shoe: small disturbances have a growth rate of {lyapunov_exponent:.3g} "
+        "1/s, and vx has {level:.3g} m/s, not the {level_without_waves:.3g} m/s to which it would come without "
+        "the roughness",
         regime=Regime.DAMPED,
         excitation=Excitation.FORCED,
     ),
     Row(
         "dies out, not yet",
         lambda motion, limits: motion.without_waves == Continuation.DIES and not steady(motion, limits),
-        "without the roughness the vibration dies out, but its level still {word} by e^{change:.2g} in the "
+        "without the roughness the vibration dies out, but its level still {word} by e^{level_change:.2g} in the "
         "second half",
         "run at least {waited:.3g} s",
         longer=True,
     ),
     Row(
         "no dashpots, rough",
-        lambda motion, limits: motion.undamped and not motion.growth > 0.0,
+        lambda motion, limits: motion.undamped and not motion.growth_rate > 0.0,
         "no dashpot damps what the shoe adds to what the waves force",
         _DASHPOT,
     ),
@@ -329,7 +337,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         lambda motion, limits: (
             motion.without_waves == Continuation.LASTS
             and apart(motion, limits)
-            and (motion.growth > 0.0 or (steady(motion, limits) and not another(motion, limits)))
+            and (motion.growth_rate > 0.0 or (steady(motion, limits) and not another(motion, limits)))
             and gives(motion, limits)
         ),
         "the vibration lasts without the roughness, with a phase of its own",
@@ -367,25 +375,25 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "still changes",
         lambda motion, limits: not steady(motion, limits),
-        "the level {word} by e^{change:.2g} in the second half",
+        "the level {word} by e^{level_change:.2g} in the second half",
         "run at least {longer:.3g} s",
         longer=True,
     ),
     Row(
         "energy still changes",
-        lambda motion, limits: math.isfinite(motion.power_left) and not balances(motion, limits),
+        lambda motion, limits: math.isfinite(motion.power_stored) and not balances(motion, limits),
         "the level of vx does not change, but the energy does: friction gives {power_of_friction:.2g} W and the "
-        "roughness {power_of_roughness:.2g} W, {power_left:.2g} W more than dashpots take",
+        "roughness {power_of_roughness:.2g} W, {power_stored:.2g} W more than dashpots take",
         "run longer",
         longer=True,
     ),
     Row(
         "phase not known",
         lambda motion, limits: (
-            math.isfinite(motion.exponent_error) and not (together(motion, limits) or apart(motion, limits))
+            math.isfinite(motion.lyapunov_error) and not (together(motion, limits) or apart(motion, limits))
         ),
-        "it is not certain whether neighbours come together: they change at {exponent:.2g} ± "
-        "{exponent_error:.1g} 1/s; " + _SOURCES,
+        "it is not certain whether neighbours come together: they change at {lyapunov_exponent:.2g} ± "
+        "{lyapunov_error:.1g} 1/s; " + _SOURCES,
         "run at least {told_apart:.3g} s",
         longer=True,
     ),
