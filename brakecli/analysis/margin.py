@@ -64,17 +64,18 @@ def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iter
     sides = ((value, grows(margin(value))) for value in values)
     for (low, before), (high, after) in pairwise(sides):
         if before is not after:
-            yield located(margin, low, high, width)
+            yield _located(margin, low, high, width, values[-1] if before else values[0])
 
 
-def located(margin: Margin, low: float, high: float, width: float = 0.0) -> Change:
-    """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does."""
-    lower = low
-    upper = high
+def _located(margin: Margin, low: float, high: float, width: float, bound: float) -> Change:
+    """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does.
+
+    Where rounding hides the side of the stable end as well, the bracket reaches on, up to a bound.
+    """
     lost = grows(margin(high))
     low, high = _narrowed(margin, low, high, lost, width)
     low, high = bisect(lambda value: grows(margin(value)) is not lost, low, high, width=width)
-    stable, bound = (low, lower) if lost else (high, upper)
+    stable = low if lost else high
     passing = _negative(margin(high if lost else low))
 
     def hidden(value: float) -> bool:

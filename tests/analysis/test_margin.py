@@ -53,6 +53,20 @@ def test_beyond_its_error_the_side_of_a_change_is_sure() -> None:
     assert 1e-6 <= found.error <= 2e-5
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_value_at_which_rounding_hides_the_side_ends_no_bracket(sign: float) -> None:
+    """The root lies 1e-9 beside a value that is looked at, on its stable side; the error is 1e-6."""
+    root = 0.5 - sign * 1e-9
+
+    def margin(x: float) -> list[Rounded]:
+        return [Rounded(sign * (root - x), 1e-6)]
+
+    (found,) = changes(margin, VALUES)
+    assert abs(found.value - root) <= found.error <= 2e-5
+    stable = found.value - sign * found.error
+    assert sign * (root - stable) > 1e-6
+
+
 def test_where_sliding_ends_nothing_passes_zero() -> None:
     def ends(x: float) -> list[Rounded] | None:
         return [Rounded(1.0)] if x < 0.35 else None
