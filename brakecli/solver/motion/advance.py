@@ -1,7 +1,7 @@
 """The loop of exact propagation: step by step through a phase, to the first event in it, and on into the next one.
 
-A step is a whole one, or a part of one: up to a stop, to a knot of speed or load, or to an event. Nothing is
-smoothed, and nothing is passed over.
+A step is a whole one, by matrices; or a part of one, by a series: up to a stop, a knot of speed or load, or an
+event. Nothing is smoothed.
 """
 
 import math
@@ -99,7 +99,8 @@ def advance(p: Plant, scratch: Floats, until: float, turns: bool) -> int:
     """Carry the block until a time (s) since `base`; with `turns` also until v_x has changed its sign in a step.
 
     `begin` has found the phase, `knot` says when speed or load change their slopes, `h` is the step, and `count`,
-    `rounds`, `account`, `measures` and `limit` say what is carried along. It returns how it ends (`events`).
+    `rounds`, `account`, `measures` and `limit` say what is carried along. It returns how it ends (`events`): by
+    `TURNED` also where an event in the same step ends it.
     """
     m = p.block
     e = p.exact

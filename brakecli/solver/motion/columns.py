@@ -1,8 +1,9 @@
 """The block beside a motion: small disturbances of it, and its error by rounding, which obey the same linear map.
 
-Within a phase a disturbance w follows the same equation as the motion: w(t) = exp(A t) w(0). The disturbed
-motion comes to an event n·z = 0 later, by -n·w / n·f, where f = dz/dt is the velocity of the motion as it arrives.
-For that time it goes on with f and not with f', the velocity behind the event:
+Within a phase a disturbance w follows the same equation as the motion: w(t) = exp(A t) w(0) by matrices, and the
+derivative of each step by Runge-Kutta. The disturbed motion comes to an event n·z = 0 later, by -n·w / n·f, where
+f = dz/dt is the velocity of the motion as it arrives. For that time it goes on with f and not with f', the
+velocity behind the event:
 
     w' = (I + (f' - f) nᵀ / (nᵀ f)) w,
 

@@ -43,7 +43,7 @@ too many steps; where v_x has passed through zero; where events do not end; far 
 
 @kernel(inline=False)
 def enter_phase(p: Plant, phase: int) -> None:
-    """Enter a phase; where it is undecided the shoe gets the wheel's velocity, and forces choose stick or slip."""
+    """Enter a phase. Where it is undecided, forces choose; a shoe that sticks has the wheel's velocity."""
     m = p.block
     if m.propagator == RUNGE_KUTTA:
         m.phase = forces.held_phase(p) if phase == UNDECIDED else phase
@@ -60,7 +60,7 @@ def enter_phase(p: Plant, phase: int) -> None:
 
 @kernel(inline=False)
 def anchor(p: Plant, scratch: Floats) -> None:
-    """In stick, remember where the shoe holds on to the wheel."""
+    """Remember where the shoe holds on to the wheel, if it sticks; at constant speed in any phase."""
     m = p.block
     if p.drive.belt_end == p.drive.belt_at:
         m.anchor = m.z[X] - m.z[BELT] * m.time

@@ -1,4 +1,4 @@
-"""A motion and what is carried along with it, and the matrices that propagate it exactly on smooth pads."""
+"""Records: a motion and what is carried along with it, what either propagator computes, and a pursued orbit."""
 
 from brakecli.solver.records import record
 
@@ -38,7 +38,7 @@ RUNGE_KUTTA, MATRICES = range(2)
 BLOCK = record(
     "x y v_x v_y",  # motion at the start, or at the sample reached, m and m/s
     "force",  # normal force at the start, N
-    "h",  # longest step, s
+    "h",  # the step that matrices are made for, or the longest one of Runge-Kutta, s
     "anchor anchor_low",  # x - travel in stick, a sum of two doubles, m
     "base time",  # when the span began, and time since then, s
     "knot",  # time from which on speed or load change otherwise, s
@@ -87,7 +87,7 @@ BLOCK = record(
 
 EXACT = record(
     "stiffness",  # of the contact, N/m
-    before=(float, AHEAD),  # the motion reached with its margins
+    before=(float, AHEAD),  # the motion reached, its margins, and their slopes times the step
     after=(float, AHEAD),  # that at the end of a step
     needed=(float, SIZE),  # row whose product with z is the friction force that stick takes, N
     generator=(float, (PHASES, SIZE, SIZE)),  # A

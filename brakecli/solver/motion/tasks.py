@@ -18,7 +18,10 @@ SAMPLE, FLY, SEEK, SWING = range(4)
 
 @entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
 def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int) -> int:
-    """Do the task of the block by exact propagation, for `seconds` or to the level `stop`; how it ends."""
+    """Do the task of the block by exact propagation, for `seconds` or to the level `stop`.
+
+    How it ends: a `Failure` of samples, a number of `events` of a span, one of `orbit` of a pursuit.
+    """
     p = plants[0]
     task = p.block.task
     if task == SAMPLE:
