@@ -10,6 +10,7 @@ import tomli_w
 import brakecli
 from brakecli.analysis.stability.report import stability
 from brakecli.branches.line import Line
+from brakecli.branches.sliding import Sliding
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.scattering.eigen import answer_of
@@ -62,3 +63,34 @@ def test_a_rough_shoe_has_the_same_critical_friction_and_bar_in_a_sweep() -> Non
         found = search(critical, Line(case, [critical.parameter], critical.lower, critical.upper))
         assert found.value == pytest.approx(value, rel=DIGITS), place
         assert found.error == pytest.approx(told.critical_error, rel=0.1, abs=1e-8 * value), place
+
+
+def test_self_locking_of_a_rough_shoe_is_a_change_for_all() -> None:
+    """In full contact: steady sliding ends where the determinant of the stiffness is zero."""
+    case = make(
+        {
+            "shoe": {"mass": 0.3085080421393824},
+            "wheel": {"radius": 0.5, "angular_speed": -0.05171182578244892},
+            "link1": {"stiffness": 8918939.360033464, "damping": 0.0, "angle_deg": -24.45639401494012},
+            "link2": {"stiffness": 21055621.77829502, "damping": 0.0, "angle_deg": 27.019052380302064},
+            "load": {"force": 1291.8458564252483},
+            "friction": {"coefficient": 0.5},
+            "contact": {"half_length": 4.778111480935504e-05, "stiffness": 216869263618.05194},
+            "roughness": {
+                "wheel": {
+                    "amplitudes": [3.5414050263521763e-06],
+                    "wavelengths": [0.00039809115598824765],
+                    "phases_deg": [284.42770897740246],
+                }
+            },
+            "solver": {"duration": 0.1},
+            "output": {"sample_interval": 1e-4},
+        }
+    )
+    told = stability(system_of(case)).critical
+    assert told is not None
+    assert told.instability == "divergence"
+    sliding = Sliding(Line(case, ["friction.coefficient"], 0.0, 3.0))
+    (change,) = sliding.changes(sliding.along())
+    assert (change.kind, change.lost) == ("divergence", True)
+    assert 3.0 * change.p == pytest.approx(told.friction, rel=DIGITS)

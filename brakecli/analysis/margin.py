@@ -25,6 +25,7 @@ SURE = 3.0
 _HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `located`
 _CLOSE = 4.0  # units of rounding beside a root, where the sides of a change are asked first
 _WIDER = 8.0  # by which that becomes more
+_AT_ENDS = 1e-3  # of the distance of two values; a choice
 _SEARCHES = 30  # steps of the search for an extreme
 _GOLDEN = 0.3819660112501051
 
@@ -53,8 +54,15 @@ def changes(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iter
 
 
 def places(margin: Margin, values: Sequence[float]) -> list[float]:
-    """The values, and those between where something that keeps its sign is nearest to zero, or beyond it."""
-    return sorted({*values, *_extremes(margin, values)})
+    """The values, and those between where something that keeps its sign is nearest to zero, or beyond it.
+
+    Beside the ends a value more is looked at: what falls there may be least before the next one.
+    """
+    if len(values) < 2:
+        return list(values)
+    first = values[0] + _AT_ENDS * (values[1] - values[0])
+    last = values[-1] - _AT_ENDS * (values[-1] - values[-2])
+    return sorted({*values, *_extremes(margin, [values[0], first, *values[1:-1], last, values[-1]])})
 
 
 def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iterator[Change]:
@@ -92,15 +100,16 @@ def _located(margin: Margin, low: float, high: float, width: float, bound: float
         stable = (max if lost else min)(stable + stride, bound)
         stride = 2.0 * stride
     low, high = (stable, high) if lost else (low, stable)
-    return Change(0.5 * (low + high), 0.5 * (high - low), lost, passing[0] if passing else None)
+    value = 0.5 * (low + high)
+    return Change(value, 0.5 * (high - low) + math.ulp(value), lost, passing[0] if passing else None)
 
 
 def left_open(
     margin: Margin, windows: Sequence[Margin], summed: Margin, change: Change, near: float
 ) -> float | None:
-    """How far a change may lie off, as the mean contact over the waves is interpolated, and over few waves.
+    """How far a change may lie off, as the mean contact is interpolated, by cells, and over few waves.
 
-    `windows`: the margin by each stretch of the waves alone; `summed`: by a mean that is not interpolated. One
+    `windows`: the margin by each stretch of the waves alone; `summed`: by finer cells, and not interpolated. One
     that is higher by δ passes zero by δ over the slope farther on. They are asked at a stable value `near` it,
     where the slope is the margin over the distance. None where one of them has no steady sliding there, and where
     steady sliding itself ends.

@@ -10,13 +10,14 @@ import numpy as np
 from brakecli.analysis import margin
 from brakecli.analysis.margin import grows
 from brakecli.analysis.stability.certain import Rounded, conditions, links_with
+from brakecli.analysis.stability.edges import middles
 from brakecli.analysis.stability.modes import Complex, eigensystem
 from brakecli.branches.cycles import Cycles
 from brakecli.branches.line import Line
 from brakecli.branches.newton import start
 from brakecli.branches.point import Point
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import PRESSED, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import PRESSED, sliding, tabulated
 
 PLACES = 65
 """Places at which steady sliding is looked at."""
@@ -32,7 +33,7 @@ PHASES = 720
 class Slide:
     """Steady sliding at a place of the line; no eigenvalues (1/s) where there is none.
 
-    `signs` are its margin, see `analysis.margin`; where a smooth shoe locks there is one, but no steady sliding.
+    `signs` are its margin, see `analysis.margin`; where the shoe locks there is one, but no steady sliding.
     """
 
     p: float
@@ -89,21 +90,21 @@ class Sliding:
                 pressed = (rest := shoe.rest) is not None and -stiffness * rest[1] > PRESSED * abs(load)
             else:
                 system = line.system(p)
-                found = steady_sliding(system, mean=tabulated(system))
+                found = sliding(system, tabulated(system))
                 c = system.coefficients
-                stiffness = found.stiffness
+                stiffness = found.stiffness if found else system.contact_stiffness
                 belt = system.belt_speed
-                rest = (found.x, found.y)
-                pressed = found.is_pressed(system.load_at_start)
+                rest = (found.x, found.y) if found else None
+                pressed = found is not None and found.is_pressed(system.load_at_start)
         except CaseError:
             return nothing
-        locks = line.smooth and rest is None
+        locks = rest is None
         if belt == 0.0 or not (pressed or locks):
             return nothing
         grip = c.grip(belt)
         signs = conditions(links_with(c), stiffness, grip)
         if locks:  # beyond divergence there is no steady sliding, and the determinant says where it ended
-            return Slide(p, None, None, None, signs)
+            return nothing if signs[0].value > signs[0].error else Slide(p, None, None, None, signs)
         values, vectors = eigensystem(c, stiffness, grip)
         return Slide(p, values, vectors, rest, signs)
 
@@ -112,7 +113,10 @@ class Sliding:
 
     def along(self) -> list[Slide]:
         """Steady sliding along the whole line, with further places where its margin has extremes."""
-        return [self.at(p) for p in margin.places(self._margin, np.linspace(0.0, 1.0, PLACES).tolist())]
+        line = self.line
+        inner = [line.place(value) for value in middles(line.case_at(0.0), line.keys, line.low, line.high)]
+        values = sorted({*np.linspace(0.0, 1.0, PLACES).tolist(), *inner})
+        return [self.at(p) for p in margin.places(self._margin, values)]
 
     def changes(self, slides: list[Slide]) -> list[Change]:
         """Where stability is lost or regained, in the order of p."""

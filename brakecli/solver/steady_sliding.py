@@ -234,6 +234,14 @@ def sliding(system: System, mean: Mean | None = None, phi: float | None = None) 
     return None
 
 
+def finer(system: System) -> System:
+    """The system with twice as many cells, or with the exact contact where these are too many."""
+    if not system.nodes:
+        return system
+    twice = system.by(evaluator="cells", nodes=2 * system.nodes)
+    return twice if twice.table_bytes <= MOST_TABLE_BYTES else system.by(evaluator="exact")
+
+
 def off_by_nodes(system: System, rest: SteadySliding) -> tuple[float, float]:
     """How far x and y (m) of steady sliding by nodes lie off those of the exact contact.
 
@@ -243,10 +251,7 @@ def off_by_nodes(system: System, rest: SteadySliding) -> tuple[float, float]:
     c = system.coefficients
     if not system.nodes or c.c_xx == 0.0:
         return 0.0, 0.0
-    finer = system.by(evaluator="cells", nodes=2 * system.nodes)
-    if finer.table_bytes > MOST_TABLE_BYTES:
-        finer = system.by(evaluator="exact")
-    lacks = mean_contact(finer, rest.y)[0] - rest.normal_force
+    lacks = mean_contact(finer(system), rest.y)[0] - rest.normal_force
     lean = c.c_xy / c.c_xx
     grip = c.grip(system.belt_speed)
     uplift = 1.0 - lean * grip

@@ -14,6 +14,7 @@ import numpy as np
 from brakecli.analysis.margin import Change, Margin, between, grows, left_open, places
 from brakecli.analysis.stability.certain import Rounded, conditions, links_of
 from brakecli.analysis.stability.discrete import spectral_radius
+from brakecli.analysis.stability.edges import middles
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import MARGIN
 from brakecli.branches.answers import Answers
@@ -21,7 +22,16 @@ from brakecli.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.solver.steady_sliding import PRESSED, WINDOWS, Mean, SteadySliding, steady_sliding, tabulated
+from brakecli.solver.steady_sliding import (
+    PRESSED,
+    WINDOWS,
+    Mean,
+    SteadySliding,
+    finer,
+    mean_contact,
+    steady_sliding,
+    tabulated,
+)
 from brakecli.solver.system import System
 from brakecli.sweeps.lyapunov import Steady, by_exponents
 from brakecli.sweeps.read_off import PART, explored, on_waves
@@ -47,7 +57,8 @@ def search(critical: Critical, line: Line) -> Search:
         found = rest_at(value)
         return found if found and found[1].is_pressed(found[0].load_at_start) else None
 
-    exact = _by_eigenvalues(critical, case_at, rest_at, steady_at)
+    inner = middles(case_at(critical.lower), line.keys, critical.lower, critical.upper)
+    exact = _by_eigenvalues(critical, case_at, rest_at, steady_at, inner)
     if critical.method == "eigenvalue" or exact.outcome is Outcome.NO_SLIDING:
         return exact
     case = case_at(critical.lower)
@@ -99,9 +110,16 @@ def _steady(
 
 
 def _by_eigenvalues(
-    critical: Critical, case_at: Callable[[float], Case], rest_at: Steady, steady_at: Steady
+    critical: Critical,
+    case_at: Callable[[float], Case],
+    rest_at: Steady,
+    steady_at: Steady,
+    inner: list[float],
 ) -> Search:
-    """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that."""
+    """Where the eigenvalues of steady sliding pass zero, and by how much the scheme at its step moves that.
+
+    `inner` values are looked at as well.
+    """
 
     def by(steady: Steady, value: float) -> list[Rounded] | None:
         try:
@@ -144,8 +162,12 @@ def _by_eigenvalues(
         apart = _NEAR * (critical.upper - critical.lower)
         near = change.value - apart if change.lost else change.value + apart
         near = min(max(near, critical.lower), critical.upper)
+
+        def summed(system: System) -> Mean:
+            return partial(mean_contact, finer(system))
+
         windows = [partial(by, partial(_steady, case_at, partial(tabulated, window=k))) for k in range(WINDOWS)]
-        return left_open(signs_at, windows, partial(by, partial(_steady, case_at, None)), change, near) or 0.0
+        return left_open(signs_at, windows, partial(by, partial(_steady, case_at, summed)), change, near) or 0.0
 
     def searched(margin: Margin, values: list[float]) -> Search:
         if all(steady_at(value) is None for value in values):
@@ -157,7 +179,7 @@ def _by_eigenvalues(
         return of_edges(critical, grows(margin(critical.lower)), edges)
 
     values = scanned(SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
-    exact = searched(signs_at, places(signs_at, values))
+    exact = searched(signs_at, places(signs_at, sorted({*values, *inner})))
     exact = exact._replace(eigenvalue=exact.value)
     beside = exact.value and (steady_at(exact.lower) or steady_at(exact.upper))
     if not beside or beside[0].method.own_steps:

@@ -3,7 +3,7 @@
 import csv
 import io
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, reduce
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ import tomli_w
 
 from brakecli.analysis.margin import changes
 from brakecli.analysis.stability.certain import Rounded, conditions, links_with
+from brakecli.analysis.stability.edges import middles
 from brakecli.analysis.stability.follow import followed
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import given_toml
@@ -77,8 +78,12 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
     critical = list[float]()
     known = {value: report for value, report in zip(values, reports, strict=True) if report.belt_speed}
 
+    case = plan.case(dict.fromkeys(plan.settings(0), values[0]))
+    whole = isinstance(reduce(getattr, axis.parameter[0].split("."), case), int)
+
     @cache
     def signs_at(value: float) -> list[Rounded] | None:
+        value = round(value) if whole else value
         if value not in known:
             progress("critical values", len(critical), len(critical) + 1)
         system = system_at(value)
@@ -91,7 +96,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
             )
         )
 
-    for change in changes(signs_at, sorted(known)):
+    inner = middles(case, list(axis.parameter), values[0], values[-1]) if known else []
+    for change in changes(signs_at, sorted({*known, *inner})):
         critical.append(change.value if abs(change.value) > _ZERO * abs(values[-1] - values[0]) else 0.0)
     if values[-1] < values[0]:
         critical.reverse()

@@ -363,6 +363,35 @@ def test_a_mean_over_waves_has_a_bar_that_holds_a_finer_one() -> None:
     assert (full.critical_error, full.contact_stiffness_error) == (0.0, 0.0)
 
 
+def test_the_bar_of_a_critical_friction_holds_what_cells_leave_out() -> None:
+    """A rough shoe on a smooth wheel, whose mean is a single place: nothing but cells and heights can be off."""
+    tables: Tables = {
+        "shoe": {"mass": 18.30469856070874},
+        "wheel": {"radius": 0.5, "angular_speed": 0.20848428859820098},
+        "link1": {"stiffness": 7202345.507161807, "damping": 1.8775986466040255, "angle_deg": -19.159593106909806},
+        "link2": {"stiffness": 9424535.032946015, "damping": 3.5465678658878637, "angle_deg": 24.434706707090832},
+        "load": {"force": 534.1413233855757},
+        "friction": {"coefficient": 1.098723012284857},
+        "contact": {"half_length": 0.005056943884716141, "stiffness": 386957864.32310295},
+        "roughness": {
+            "shoe": {
+                "amplitudes": [0.00021109268790473948],
+                "wavelengths": [0.005056943884716141],
+                "phases_deg": [268.84170837345937],
+            }
+        },
+        "solver": {"step": 5.485058328284037e-05, "duration": 0.765},
+        "output": {"sample_interval": 1.0970011656656868e-04},
+    }
+    cells = stability(system_of(make(tables)))
+    exact = stability(system_of(make(tables, contact__evaluator="exact")))
+    assert cells.critical is not None
+    assert exact.critical is not None
+    assert cells.critical_error is not None
+    off = abs(cells.critical.friction - exact.critical.friction)
+    assert 0.5 * off < cells.critical_error < 2.0 * off
+
+
 @campaign
 def test_mirror_images_of_open_pads_agree_within_their_bars() -> None:
     tried = 0

@@ -107,14 +107,14 @@ def test_keys_are_tied_and_whole_numbers_stay_whole(here: Path) -> None:
         "--set",
         "roughness.wheel={amplitudes=[1e-7], wavelengths=[0.02]}",
         "--vary",
-        "contact.nodes=64:256:2",
+        "contact.nodes=64:256:3",
     ]
     lines = [["stability", DAMPED, *more] for more in (tied, alone, [*nodes, "--json"])]
     many, one, whole = (done.json for done in each(here, lines))
     assert many["parameters"] == ["link1.stiffness", "link2.stiffness"]
     assert many["vary"][1]["critical_friction"] == one["critical_friction"]
     assert sorted(many["vary"][1]["growth_rates"]) == sorted(mode["growth"] for mode in one["modes"])
-    assert [entry["value"] for entry in whole["vary"]] == [64, 256]
+    assert [entry["value"] for entry in whole["vary"]] == [64, 160, 256]
 
 
 def test_a_table_fits_into_eighty_columns_and_breaks_no_word(monkeypatch: pytest.MonkeyPatch) -> None:

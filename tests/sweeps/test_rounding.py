@@ -233,3 +233,36 @@ def test_a_window_between_two_of_the_values_that_are_looked_at_is_found(
     assert not any((begin <= values) & (values <= end))
     sides = [unstable(at(tables, key, value)) for value in (begin - 1e-9, begin + 1e-9, end - 1e-9, end + 1e-9)]
     assert sides == [False, True, True, False]
+
+
+@pytest.mark.parametrize(("low", "high", "beyond"), [(2.99e6, 8e6, 1e-6), (1e5, 1e9, 1e-5)])
+def test_a_window_beside_an_end_of_the_range_is_found(low: float, high: float, beyond: float) -> None:
+    """About c2 = 3 MN/m, where friction is a little above the least critical one; a scan begins next to it."""
+    tables = at(UNDAMPED, "friction__coefficient", UNDAMPED["friction"]["coefficient"] * (1.0 + beyond))
+    found = answer(tables, "link2__stiffness", low, high, method="eigenvalue", tolerance=1e-3)
+    ((begin, end),) = found.windows
+    assert begin < 3e6 < end
+    sides = [
+        unstable(at(tables, "link2__stiffness", value))
+        for value in (begin - 1.0, begin + 1.0, end - 1.0, end + 1.0)
+    ]
+    assert sides == [False, True, True, False]
+
+
+def test_three_changes_between_two_of_the_values_are_found() -> None:
+    """Flutter is regained and lost again within 0.03°, between values that are 1.3° apart."""
+    tables: Tables = {
+        "shoe": {"mass": 0.018184234583181535},
+        "wheel": {"radius": 0.5, "angular_speed": 0.2402289906113433},
+        "link1": {"stiffness": 25571.235614265337, "damping": 72.37639015216423, "angle_deg": -27.494473333906924},
+        "link2": {"stiffness": 24459525.473803513, "damping": 161.26142542088354, "angle_deg": -7.0},
+        "load": {"force": 5.137243362604452},
+        "friction": {"coefficient": 1.3020623105393148},
+        "contact": {"half_length": 0.01352634705162007, "stiffness": 585672.414778953},
+        "solver": {"duration": 0.1},
+        "output": {"sample_interval": 1e-4},
+    }
+    found = answer(tables, "link2__angle_deg", *RANGES["link2__angle_deg"], method="eigenvalue", tolerance=1e-3)
+    assert np.ravel(found.windows) == pytest.approx([62.476295, 62.476731, 62.505527, 85.0], abs=1e-6)
+    held, _ = held_and_bars(found, tables, "link2__angle_deg", *RANGES["link2__angle_deg"])
+    assert held == [True, True, True]

@@ -6,7 +6,9 @@ tangent: sine and cosine are divided by the cosine, and all that does not depend
 """
 
 import math
+from collections.abc import Sequence
 from contextlib import suppress
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,12 +16,28 @@ from numpy.polynomial import Polynomial, polynomial
 
 from brakecli.analysis.stability.modes import routh_hurwitz
 from brakecli.case.case import Case
+from brakecli.case.system import system_of
 from brakecli.solver.links import sin_cos, tensor
 from brakecli.solver.steady_sliding import PRESSED
 
 _REAL = 1e-3
 """Largest imaginary part of a root over its size: rounding moves double ones, and one too many is harmless."""
 _LEFT = 1e-13  # largest coefficient that rounding may have left, over the largest one
+
+
+def middles(case: Case, keys: Sequence[str], low: float, high: float) -> list[float]:
+    """A value between each two edges in a range of a key: stability is the same at all others between them.
+
+    None on rough pads, whose stiffness depends on the key, and of more keys than one.
+    """
+    system = system_of(case)
+    if not system.smooth or system.belt_speed == 0.0 or len(keys) > 1:
+        return []
+    low, high = min(low, high), max(low, high)
+    size = max(abs(low), abs(high))
+    found = edges(case, keys[0], size, system.contact_stiffness, math.copysign(1.0, system.belt_speed), 0.0)
+    ends = sorted({low, high, *(each for each in found if low < each < high)})
+    return [0.5 * (one + other) for one, other in pairwise(ends)]
 
 
 def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: float, margin: float) -> list[float]:

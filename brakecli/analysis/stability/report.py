@@ -28,6 +28,7 @@ from brakecli.solver.steady_sliding import (
     WINDOWS,
     Mean,
     SteadySliding,
+    finer,
     mean_contact,
     sliding,
     steady_sliding,
@@ -208,7 +209,7 @@ def _critical_error(system: System, critical: Crossing, windows: list[Mean]) -> 
     which = FLUTTER if critical.instability == "flutter" else DIVERGENCE
     change = Change(critical.friction, 0.0, True, which)
     near = max(critical.friction - _NEAR, 0.0)
-    summed = by(partial(mean_contact, system))
+    summed = by(partial(mean_contact, finer(system)))
     return left_open(by(tabulated(system)), [by(mean) for mean in windows], summed, change, near)
 
 
