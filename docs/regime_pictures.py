@@ -308,7 +308,7 @@ def answers(numbers: dict[str, Any]) -> str:
         lines.append(level(evidence))
     if numbers["growth_rate"] is not None:
         lines.append(f"theory: {numbers['growth_rate']:.3g} 1/s")
-    elif "exponent" in evidence:
+    elif "lyapunov_exponent" in evidence:
         lines.append(f"neighbours: {evidence['lyapunov_exponent']:.2g} ± {evidence['lyapunov_error']:.1g} 1/s")
     if evidence.get("growth_rate") and "linear" not in evidence:
         lines.append(f"sliding: {'unstable' if evidence['growth_rate'] > 0.0 else 'stable'}")

@@ -22,7 +22,7 @@ FLUTTER = 1
 """Places of both conditions in a margin."""
 SURE = 3.0
 """Standard errors of the mean of windows of the waves that a bar holds; a choice."""
-_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `located`
+_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `_located`
 _CLOSE = 4.0  # units of rounding beside a root, where the sides of a change are asked first
 _WIDER = 8.0  # by which that becomes more
 _AT_ENDS = 1e-3  # of the distance of two values; a choice
@@ -118,8 +118,13 @@ def left_open(
     if change.which is None or change.value == near or any(each is None for each in signs):
         return None
     here, exact, *others = (each[change.which].value for each in signs if each is not None)
-    off = abs(exact - here) + SURE * statistics.stdev(others) / math.sqrt(len(others))
+    off = abs(exact - here) + left_by_windows(others)
     return off * abs(change.value - near) / abs(here) if off else 0.0
+
+
+def left_by_windows(values: Sequence[float]) -> float:
+    """By how much the mean of what the windows say is surely not off; 0 where there are none."""
+    return SURE * statistics.stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0.0
 
 
 def _negative(signs: Sequence[Rounded] | None) -> list[int]:

@@ -155,7 +155,7 @@ def _by_eigenvalues(
         values: list[float] = np.linspace(critical.lower, critical.upper, count).tolist()
         return values
 
-    def off(change: Change) -> float:
+    def by_the_mean(change: Change) -> float:
         """By which the mean over the waves leaves a change open, as far as there is steady sliding."""
         if system_of(case_at(change.value)).smooth:
             return 0.0
@@ -169,17 +169,14 @@ def _by_eigenvalues(
         windows = [partial(by, partial(_steady, case_at, partial(tabulated, window=k))) for k in range(WINDOWS)]
         return left_open(signs_at, windows, partial(by, partial(_steady, case_at, summed)), change, near) or 0.0
 
-    def searched(margin: Margin, values: list[float]) -> Search:
+    def searched(margin: Margin, values: list[float], off: Callable[[Change], float]) -> Search:
         if all(steady_at(value) is None for value in values):
             return Search(Outcome.NO_SLIDING)
-        edges = [
-            Edge(each.value, each.error + (off(each) if margin is signs_at else 0.0))
-            for each in between(margin, values, width)
-        ]
+        edges = [Edge(each.value, each.error + off(each)) for each in between(margin, values, width)]
         return of_edges(critical, grows(margin(critical.lower)), edges)
 
     values = scanned(SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
-    exact = searched(signs_at, places(signs_at, sorted({*values, *inner})))
+    exact = searched(signs_at, places(signs_at, sorted({*values, *inner})), by_the_mean)
     exact = exact._replace(eigenvalue=exact.value)
     beside = exact.value and (steady_at(exact.lower) or steady_at(exact.upper))
     if not beside or beside[0].method.own_steps:
@@ -187,7 +184,7 @@ def _by_eigenvalues(
     if beside[0].method.step is None:
         return exact
     ends = [critical.lower, *(end for window in exact.windows for end in window), critical.upper]
-    middles = [0.5 * (low + high) for low, high in pairwise(ends)]
-    own = searched(in_steps, sorted({*scanned(SCANNED_WHERE_OPEN), *middles}))
+    halfway = [0.5 * (low + high) for low, high in pairwise(ends)]
+    own = searched(in_steps, sorted({*scanned(SCANNED_WHERE_OPEN), *halfway}), lambda _: 0.0)
     same = own.value is not None and exact.value is not None and exact.outcome is own.outcome
     return exact._replace(bias=own.value - exact.value) if same else exact  # type: ignore[operator]

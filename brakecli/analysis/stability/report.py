@@ -8,7 +8,16 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.margin import DIVERGENCE, FLUTTER, SURE, Change, Margin, between, grows, left_open
+from brakecli.analysis.margin import (
+    DIVERGENCE,
+    FLUTTER,
+    Change,
+    Margin,
+    between,
+    grows,
+    left_by_windows,
+    left_open,
+)
 from brakecli.analysis.margin import changes as margin_changes
 from brakecli.analysis.stability.certain import Rounded, conditions, links_with
 from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
@@ -117,7 +126,7 @@ def stability(system: System) -> StabilityReport:
         crossings=tuple(found),
         critical=critical,
         critical_error=_critical_error(system, critical, means) if critical else None,
-        contact_stiffness_error=_spread([at.stiffness for mean in opens if (at := sliding(system, mean))]),
+        contact_stiffness_error=left_by_windows([at.stiffness for mean in opens if (at := sliding(system, mean))]),
         undamped_flutter=flutter,
         undamped_divergence=divergence,
         discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
@@ -177,11 +186,6 @@ def mean_stiffness(system: System, smooth: float, mean: Mean | None = None) -> S
         return rest.stiffness if rest and rest.is_pressed(system.load_at_start) else math.nan
 
     return at
-
-
-def _spread(values: list[float]) -> float:
-    """By how much the mean of what the windows say is surely not off; 0 where there are none."""
-    return SURE * float(np.std(values, ddof=1)) / math.sqrt(len(values)) if len(values) > 1 else 0.0
 
 
 def _along_friction(c: Coefficients, belt: float, stiffness_at: StiffnessAt) -> Margin:
