@@ -10,7 +10,7 @@ import numpy as np
 from brakecli.analysis.shoe import Shoe
 from brakecli.analysis.stability.modes import eigensystem, growth, is_undamped
 from brakecli.solver.arrays import Floats
-from brakecli.solver.motion.flow import Orbit, Pursuit
+from brakecli.solver.motion.flow import FOREVER, Modes, Orbit, Pursuit
 from brakecli.solver.motion.orbit import FOUND, LINEAR
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
@@ -46,7 +46,8 @@ class Fate(NamedTuple):
     """What a motion comes to: its kind, and what is known of that.
 
     `orbit` is that of a limit cycle, with the `rate` (1/s) at which its slowest disturbance fades. `state`: x, y,
-    v_x and v_y on a vibration, at t = 0 of the waves. `steps`: what it took to know.
+    v_x and v_y on a vibration, at t = 0 of the waves. `steps`: what it took to know. `motion`: what was followed
+    on smooth pads, and can be followed on.
     """
 
     kind: Kind
@@ -54,6 +55,7 @@ class Fate(NamedTuple):
     rate: float | None = None
     state: Floats | None = None
     steps: int = 0
+    motion: Pursuit | None = None
 
     @property
     def lasts(self) -> bool | None:
@@ -93,34 +95,41 @@ def fate(system: System, state: Floats, within: float = math.inf, forced: Sequen
     return Fate(Kind.FORCED if waves else Kind.STEADY_SLIDING, steps=steps)
 
 
-def fate_on_smooth_pads(shoe: Shoe, state: Floats, within: float = math.inf) -> Fate:
+def fate_on_smooth_pads(
+    shoe: Shoe, state: Floats, within: float = math.inf, modes: Modes | None = None, until: float | None = None
+) -> Fate:
     """What the motion of a smooth shoe from a state (x, y, v_x, v_y) comes to, within some time (s).
 
     It fades once its modes can bring about no event any more, and lasts once it nears an orbit that attracts it.
-    Where sliding is unstable it cannot fade: one that still vibrates when it is given up lasts.
+    Where sliding is unstable it cannot fade: one that still vibrates when it is given up lasts. One that comes so
+    near to sliding that nothing happens `until` a time (s), or for long, is given up at once.
+
+    `modes`: eigenvalues, and the vectors of position and velocity in columns, where they are known.
     """
     c, stiffness, belt, load = shoe
     if shoe.rest is None:
         return Fate(Kind.LOCKS)
     if not shoe.rest[1] < 0.0:
         return Fate(Kind.LEAVES)
-    values, shapes = eigensystem(c, stiffness, c.grip(belt))
-    modes = values, np.concatenate([shapes, shapes * values])
+    if modes is None:
+        values, shapes = eigensystem(c, stiffness, c.grip(belt))
+        modes = values, np.concatenate([shapes, shapes * values])
     try:
-        motion = Pursuit(c, (stiffness, belt, load), state, np.array(shoe.rest), modes)
+        motion = Pursuit(c, (stiffness, belt, load), state, np.array(shoe.rest), modes, until or FOREVER)
     except np.linalg.LinAlgError:  # modes that are alike
         return Fate(Kind.UNKNOWN)
-    rate = float(values.real.max())
+    rate = float(modes[0].real.max())
     while motion.steps < MOST_STEPS and motion.time < within and not signalled():
-        if rate > 0.0:  # near steady sliding nothing happens for long, as a disturbance grows slowly
+        if rate > 0.0 and until is None:  # a disturbance grows slowly
             motion.way.duration = motion.time + max(NEARS / rate, AHEAD * motion.path.h)
         outcome = motion.seek()
         if outcome == LINEAR:
-            return Fate(Kind.UNKNOWN if rate > 0.0 else Kind.STEADY_SLIDING, steps=motion.steps)
+            kind = Kind.UNKNOWN if rate > 0.0 else Kind.STEADY_SLIDING
+            return Fate(kind, steps=motion.steps, motion=motion)
         if outcome == FOUND and motion.multiplier < 1.0:
             orbit = motion.orbit
             fades = -math.log(max(motion.multiplier, 1e-300)) / orbit.period
-            return Fate(Kind.LIMIT_CYCLE, orbit, fades, np.array(orbit.state), motion.steps)
+            return Fate(Kind.LIMIT_CYCLE, orbit, fades, np.array(orbit.state), motion.steps, motion)
         motion.way.events = 0  # many between two falls are too many for a cycle, not for a motion
     kind = Kind.VIBRATION if rate > 0.0 and not signalled() else Kind.UNKNOWN
     return Fate(kind, state=motion.state if rate > 0.0 else None, steps=motion.steps)

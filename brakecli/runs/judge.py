@@ -5,10 +5,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.fate import Fate
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import context
 from brakecli.analysis.regime.decision import Thresholds
-from brakecli.analysis.regime.measure import Continued, Given
+from brakecli.analysis.regime.measure import Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory
 from brakecli.files.field import LARGEST
@@ -16,6 +17,7 @@ from brakecli.runs.against import exponent_of
 from brakecli.runs.certificate import Certificate
 from brakecli.runs.settled import Judged
 from brakecli.runs.tolerance import certify
+from brakecli.runs.without_waves import without_waves
 from brakecli.solver.history import History, array_history
 from brakecli.solver.integrate import Motion, Progress, Sink, solve
 from brakecli.solver.system import System
@@ -38,9 +40,7 @@ def given(
     Where a row of the verdict may need it, the motion is continued on the smooth wheel.
     """
 
-    def continued() -> Continued:
-        from brakecli.runs.without_waves import without_waves  # kernels that a linear motion does not need
-
+    def continued() -> Fate:
         last = history.samples - 1
         state = [float(history.read(name, last, last + 1)[0]) for name in ("x", "y", "vx", "vy")]
         return without_waves(system, np.array(state))

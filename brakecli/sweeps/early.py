@@ -1,27 +1,30 @@
 """A verdict as soon as it is known, on smooth pads at constant speed and load: what a sweep needs of a point.
 
-The motion is followed without samples (`solver.motion.orbit`) until one of two things is
-certain.
+It is the ordinary verdict on a motion whose fate is known, without samples. The fate says one of two things.
 
 - It slides to one side, and the sum of its modes can neither reach the speed of the wheel nor open the contact
   until the end of the run. All that is to come is linear, and the eigenvalues decide.
 - It comes to a limit cycle that attracts it. Floquet's multipliers say when it will have come to it, and the
   verdict is given where a whole run would find it settled.
 
-Where neither is certain, or where a whole run would see something else (too few samples in a cycle or in a
-stick, a settled part that is too short), there is no early verdict, and the run goes to its end.
+Where neither is certain, or where a whole run would see something else (too few samples in a cycle or beside
+steady sliding, a settled part that is too short), there is no early verdict, and the run goes to its end.
 """
 
 import math
+from itertools import groupby
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.answers import Answers, Continuation
+from brakecli.analysis.fate import Fate, fate_on_smooth_pads
+from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.decision import Regime, Thresholds
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, WINDOWS, tenths
+from brakecli.analysis.regime.measure import of_fate
 from brakecli.analysis.regime.table import decide
-from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.regime.verdict import Verdict, of_orbit
+from brakecli.analysis.shoe import Shoe
 from brakecli.analysis.stability.linear import Linear, Theory, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.runs.certificate import ROUNDING, Certificate
@@ -29,9 +32,7 @@ from brakecli.runs.settled import Judged
 from brakecli.solver.arrays import Floats
 from brakecli.solver.integrate import Work
 from brakecli.solver.motion.events import DONE
-from brakecli.solver.motion.flow import Pursuit, SmoothFlow
-from brakecli.solver.motion.orbit import FOUND, GOING_ON, LINEAR
-from brakecli.solver.motion.phases import STICK
+from brakecli.solver.motion.flow import Orbit, Pursuit, SmoothFlow
 from brakecli.solver.system import System
 
 _SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
@@ -39,8 +40,7 @@ _POWERS = 10.0  # of e, by which what is left then fades until the end: drift is
 _SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
 _CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where they cut the cycles
 _SAMPLES = 40.0  # in a cycle, so that its shape is seen
-_SEEN = 1.2  # samples in a stick, or off the wheel: one falls into each, also where the orbit is not reached yet
-_GRAZES = 0.01  # of the wheel's speed: nearer to it, samples leave open whether the shoe sticks
+_SEEN = 1.2  # samples beside steady sliding: one falls into each time, also where the orbit is not reached yet
 
 
 class Ending(NamedTuple):
@@ -56,29 +56,26 @@ def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None
     known = _theory(system, theory)
     if known is None:
         return None
-    acting = system.contact_stiffness, system.belt_speed, system.load_at_start
+    begin = system.initial.beside(known.rest)
     modes = known.values, known.vectors
-    try:
-        begin = system.initial.beside(known.rest)
-        seconds = system.sampled_duration
-        motion = Pursuit(system.coefficients, acting, begin, known.rest, modes, seconds)
-    except np.linalg.LinAlgError:  # modes that are alike
+    duration = system.sampled_duration
+    end = fate_on_smooth_pads(Shoe.of(system), begin, duration, modes, until=duration)
+    motion = end.motion
+    if motion is None:
         return None
-    while (outcome := motion.seek()) == GOING_ON:
-        pass
-    o = motion.way
-    if outcome == LINEAR:
-        found = _linear(system, known, motion)
+    if end.orbit is not None:
+        found = _cycle(system, known, end, end.orbit, motion)
+        error = end.orbit.error
     else:
-        found = _cycle(system, known, motion) if outcome == FOUND else None
+        found = _linear(system, known, motion)
+        error = ROUNDING
     if found is None:
         return None
-    verdict, end = found
-    work = Work(steps=motion.steps, contact_evaluations=motion.evaluations)
-    error = max(float(o.error), ROUNDING) if outcome == FOUND else ROUNDING  # not that of an orbit given up
-    certificate = Certificate(system.method.tolerance, True, error, system.sampled_duration, "the orbit itself")
-    row = np.array([end])
-    return Judged(verdict, Ending(system, row, work), certificate if system.method.step is None else None)
+    verdict, last = found
+    work = Work(steps=end.steps, contact_evaluations=motion.evaluations)
+    certificate = Certificate(system.method.tolerance, True, error, duration, "the orbit itself")
+    ending = Ending(system, np.array([last]), work)
+    return Judged(verdict, ending, certificate if system.method.step is None else None)
 
 
 def may_be_early(system: System) -> bool:
@@ -166,57 +163,48 @@ def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float
         seconds = seconds - float(flow.path.time)
 
 
-def _cycle(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
+def _cycle(
+    system: System, theory: Linear, end: Fate, orbit: Orbit, motion: Pursuit
+) -> tuple[Verdict, list[float]] | None:
     """The verdict on an orbit that the motion has come to well before the end of the run, and a state on it."""
-    o = motion.way
-    orbit = motion.orbit
-    factor = motion.multiplier
-    end = system.sampled_duration
-    period = orbit.period
+    way = motion.way
+    rate = end.rate or 0.0
+    duration = system.sampled_duration
     interval = system.interval
-    if not factor < 1.0 or is_undamped(system.coefficients):  # without dashpots no orbit is sure to stay
-        return None
-    rate = -math.log(max(factor, 1e-300)) / period
-    start = float(o.fell[0]) + max(math.log(max(float(o.away), 1e-300) / _SETTLED), 0.0) / rate
-    part = end - start
-    stick = orbit.stick_fraction * period
-    clear = orbit.contact_loss_fraction * period
-    limited = period - float(motion.path.spent[o.sliding])
+    fades = math.log(max(float(way.away) / _SETTLED, 1.0)) / rate
+    start = float(way.fell[0]) + fades
+    part = duration - start
     hidden = (
-        part < _SETTLED_PART * end
-        or end < _CYCLES * WINDOWS * period
-        or period < _SAMPLES * interval
-        or min(limited, stick or limited, clear or limited) < _SEEN * interval
-        or (stick == 0.0 and abs(motion.fastest - 1.0) < _GRAZES)
-        or motion.path.beaten.tolist() != [1, 1]
+        part < _SETTLED_PART * duration
+        or duration < _CYCLES * WINDOWS * orbit.period
+        or orbit.period < _SAMPLES * interval
+        or _longest_away(orbit, int(way.sliding)) < _SEEN * interval
+        or motion.path.beaten.tolist() != [1, 1]  # more than one fall of vx that counts
     )
-    if rate * part < _POWERS or hidden:
+    if (
+        rate * part < _POWERS or hidden or is_undamped(system.coefficients)
+    ):  # without dashpots none is sure to stay
         return None
-    force = float(o.force)
     answers = Answers(
-        duration=end,
+        duration=duration,
         growth_rate=theory.mode.growth,
-        without_waves=Continuation.LASTS,
-        level=1.0,  # the same as on the orbit
-        level_without_waves=1.0,
-        amplitude_without_waves=orbit.amplitude,
+        level=orbit.level,
         settled=True,
-        period_without_waves=period,
-        sticks_without_waves=float(orbit.word.count(STICK)),
         settled_duration=part,
-        cycles=part / period,
-        samples_per_cycle=period / interval,
+        cycles=part / orbit.period,
+        samples_per_cycle=orbit.period / interval,
+        **of_fate(end),
     )
     decision = decide(answers, Thresholds())._replace(frequency=orbit.frequency)
-    verdict = Verdict(
-        decision=decision,
-        amplitude=orbit.amplitude,
-        stick_fraction=orbit.stick_fraction,
-        contact_loss_fraction=orbit.contact_loss_fraction,
-        mean_friction_force=force,
-        braking_torque=system.radius * force,
-        settled_from=start,
-        settled=True,
-        evidence={"row": decision.row, "rate_without_waves": rate, "largest_multiplier": factor},
-    )
+    evidence = {"row": decision.row, "rate_without_waves": rate, "largest_multiplier": motion.multiplier}
+    numbers = of_orbit(orbit, system.radius)
+    verdict = Verdict(decision, settled_from=start, settled=True, evidence=evidence, **numbers)
     return verdict, list(orbit.state)
+
+
+def _longest_away(orbit: Orbit, sliding: int) -> float:
+    """The longest time (s) in which a motion on an orbit does not slide as it would steadily."""
+    spans = np.diff([0.0, *orbit.times, orbit.period]).tolist()
+    phases = zip(2 * orbit.word, 2 * spans, strict=True)  # the last one goes on in the first
+    groups = groupby(phases, key=lambda phase: phase[0] == sliding)
+    return max((sum(span for _, span in group) for slides, group in groups if not slides), default=0.0)

@@ -6,15 +6,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.answers import Continuation
+from brakecli.analysis.fate import Fate, Kind
 from brakecli.analysis.regime.classify import classify
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Thresholds
-from brakecli.analysis.regime.measure import Continued, Given
+from brakecli.analysis.regime.measure import Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.runs.judge import asked, judged_in_memory
 from brakecli.solver.history import History, array_history
+from brakecli.solver.motion.flow import Orbit
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Events, Track
 
@@ -96,5 +97,6 @@ def classified(history: History, context: Context, thresholds: Thresholds | None
 def lasting(history: History, context: Context, thresholds: Thresholds | None = None, **asked: Any) -> Verdict:
     """The verdict on a history that is known to last, as its end is, where it is continued on the smooth wheel."""
     x, v_x = (history.read(name, 3 * history.samples // 4, history.samples) for name in ("x", "vx"))
-    lasts = Continued(Continuation.LASTS, 0.5 * float(np.ptp(x)), float(v_x.std()), math.inf)
+    nothing = (math.nan, 0.5 * float(np.ptp(x)), math.nan, math.nan, (), (), ())
+    lasts = Fate(Kind.LIMIT_CYCLE, Orbit(*nothing, level=float(v_x.std())), math.inf)
     return classified(history, context, thresholds, continued=lambda: lasts, **asked)

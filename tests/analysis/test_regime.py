@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from brakecli.analysis.regime.answers import Continuation
+from brakecli.analysis.fate import Fate, Kind
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
-from brakecli.analysis.regime.measure import Continued
 from brakecli.analysis.regime.seen import seen
 from brakecli.analysis.regime.spectra import forced_lines
 from brakecli.solver.history import History
@@ -155,13 +154,11 @@ def test_a_motion_that_still_grows_or_decays_is_undecided_and_says_how_fast(rate
 def test_a_decay_to_nothing_is_damped() -> None:
     history = made(np.exp(-5.0 * TIME) * np.sin(2 * np.pi * 170.0 * TIME))
     assert classified(history, Context(1.0)).regime is Regime.UNDECIDED
-    assert (
-        classified(history, Context(1.0), continued=lambda: Continued(Continuation.DIES)).regime is Regime.DAMPED
-    )
+    assert classified(history, Context(1.0), continued=lambda: Fate(Kind.STEADY_SLIDING)).regime is Regime.DAMPED
 
 
 def test_what_dies_has_no_settled_amplitude_however_slowly_it_does() -> None:
-    known = Continued(Continuation.DIES)
+    known = Fate(Kind.STEADY_SLIDING)
     verdict = classified(made(np.sin(2 * np.pi * 170.0 * TIME)), Context(1.0), continued=lambda: known)
     assert (verdict.regime, verdict.settled) == (Regime.DAMPED, False)
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import tomli_w
 
-from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case, starters
@@ -70,16 +69,13 @@ def compare(found: Judged[Ending], case: Case) -> None:
         assert (ours.stick_fraction, ours.contact_loss_fraction) == (0.0, 0.0)
         assert ours.settled_from == whole.settled_from
         return
-    assert isinstance(whole, Verdict)
-    assert ours.frequency == pytest.approx(whole.frequency, rel=1e-4)
-    assert ours.amplitude == pytest.approx(whole.amplitude, rel=2e-3)
-    # the mean of whole cycles and of a part of one
-    assert whole.torque_variation is not None
-    swing = whole.torque_variation / system.radius / whole.evidence["cycles"]
-    assert ours.mean_friction_force == pytest.approx(whole.mean_friction_force, abs=swing)
-    sample = interval * whole.frequency
-    assert ours.stick_fraction == pytest.approx(whole.stick_fraction, abs=sample)
-    assert ours.contact_loss_fraction == pytest.approx(whole.contact_loss_fraction, abs=sample)
+    # both have the orbit, from other places of it and each closed to 1e-11 of its size; the time in a stick that
+    # only just comes about goes with the square root of that
+    assert ours.frequency == pytest.approx(whole.frequency, rel=1e-10)
+    assert ours.amplitude == pytest.approx(whole.amplitude, rel=1e-10)
+    assert ours.mean_friction_force == pytest.approx(whole.mean_friction_force, rel=1e-10)
+    assert ours.stick_fraction == pytest.approx(whole.stick_fraction, abs=1e-5)
+    assert ours.contact_loss_fraction == pytest.approx(whole.contact_loss_fraction, abs=1e-5)
 
 
 @pytest.mark.parametrize("shoes", counts(25, 1000))

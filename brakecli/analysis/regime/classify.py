@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 from brakecli.analysis.regime.answers import Answers
@@ -12,7 +13,7 @@ from brakecli.analysis.regime.lasting import lasting
 from brakecli.analysis.regime.measure import Given, Shown, answers
 from brakecli.analysis.regime.seen import seen
 from brakecli.analysis.regime.table import decide
-from brakecli.analysis.regime.verdict import Verdict
+from brakecli.analysis.regime.verdict import Verdict, of_orbit
 from brakecli.analysis.spectrum import segment
 from brakecli.solver.quantities import ContactState
 
@@ -55,7 +56,7 @@ def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *,
     if in_full:
         evidence |= found.known() | what.evidence | _further(shown, what, shown.context)
     theory = shown.linear if found.linear else None
-    return Verdict(
+    verdict = Verdict(
         amplitude=what.amplitude,
         amplitude_first=look.first if decision.regime is Regime.DAMPED else None,
         amplitude_spread=what.spread,
@@ -84,6 +85,7 @@ def _verdict(shown: Shown, found: Answers, decision: Decision, what: Lasting, *,
         evidence=evidence,
         thresholds=shown.limits,
     )
+    return replace(verdict, **of_orbit(what.orbit, radius)) if what.orbit else verdict
 
 
 def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, Any]:

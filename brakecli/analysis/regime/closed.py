@@ -14,6 +14,7 @@ from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear, force_parts, parts
 from brakecli.solver.alike import at_once, by_rows
 from brakecli.solver.history import stacked
+from brakecli.solver.motion.flow import Orbit
 
 RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
 _REST = 0.3  # of a forced motion, by which its closed form may be off
@@ -38,6 +39,7 @@ class Lasting:
     variation: float | None = None  # of it, peak to peak
     frequency: float | None = None  # of cycles
     cycles: Cycles | None = None  # of a vibration that lasts by itself
+    orbit: Orbit | None = None  # on which that is, so that its numbers are those of the orbit
     force_from: int = 0  # the sample from which on the force has settled: y may ring longer than x
     force_rings: float | None = None  # for how long it still rings beside a settled x
     longer: bool = True  # whether a longer run may settle what has not

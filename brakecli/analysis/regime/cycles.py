@@ -52,7 +52,6 @@ class Cycles:
     evidence: dict[str, Any]
     frequency: float  # Hz
     frequency_off: float  # Hz, what the step may change
-    kick: float  # part of itself by which impacts, as steps fall into them, may change the vibration in a cycle
     amplitude: float  # m
     amplitude_spread: float
     stick_fraction: float
@@ -67,11 +66,6 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
 
     The spreads hold what a step (s) may change, with which the motion was computed. Stick, loss of contact and
     frequency are medians of ten groups of cycles.
-
-    `kick`: where contact begins (or ends) a part s ≤ 1/2 into a step h, the force at its middle pushes by
-    K v h² s²/2 too little, and likewise from the other end: by 1/24 in the mean over s, and by up to 1/8 where all
-    cycles meet the step alike. With Ω² = K/m that is (Ω h)² times as much of the speed v, and a contact takes
-    half a period of Ω.
     """
     begins, lag = _beginnings(part, events)
     if len(begins) <= _FEWEST:
@@ -108,13 +102,10 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
     contact = contact_time(events, groups[0], groups[-1])
     turn = 2.0 * np.pi * step / period
     impact = step / contact
-    kicked = (np.pi * impact) ** 2 / contact / 24.0  # in a second of contact
-    alike = _unseen(begins / step)[0] if step else 0.0
     return Cycles(
         evidence,
         frequency,
         frequency_off=frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact),
-        kick=(1.0 - loss) * period * kicked * (1.0 + 2.0 * alike),
         amplitude=amplitude,
         amplitude_spread=spread + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude,
         stick_fraction=stick,

@@ -16,6 +16,7 @@ from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.stability.linear import parts
 from brakecli.solver.alike import at_once
 from brakecli.solver.history import History, stacked
+from brakecli.solver.motion.flow import Orbit
 
 _LIKELY = 16  # waves, of which one moves x most
 # of a settled part, in which the friction force is compared
@@ -24,12 +25,9 @@ _PIECES = 16
 _WIDER = 1.02  # times as far as in the last half of them, a transient swings
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
 _DRIFT = 5e-3  # by which amplitude or frequency of a settled limit cycle may change
-_SHIFTED = 0.5  # of itself, by which impacts may shift a cycle: beyond, its frequency is not known
-_IMPACT_AMPLITUDE_ERROR = 0.5  # largest error of a cycle's amplitude, as a part of its shift by impacts
-_IMPACT_FREQUENCY_ERROR = 0.1  # and of its frequency
 _MODULATES = 0.1  # of a vibration, beside which waves count: smaller ones change its cycles, too
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line is the frequency
-_AIM = 0.3  # part of `_SHIFTED` to which the requested step brings the shift; a choice
+_AIM = 0.3  # part of what a settled cycle may be off, to which the requested step brings it; a choice
 _WHOLE = 0.999  # part of the pattern of waves that counts as all of it: samples may miss the rest
 _FINER = 0.25  # requested sample interval over the one that misses impacts; a choice
 _VAGUE = "the amplitude may be off by as much as itself: run longer, or take a smaller solver.step"
@@ -175,27 +173,28 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     rate = 0.0 if answers.undamped else min(abs(answers.growth_rate), shown.context.settles)
     if math.isfinite(answers.rate_without_waves):
         rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
-    shift = cycles.kick * cycles.frequency / rate if rate > 0.0 else 0.0
     lasts = answers.settled and rate * seconds >= RELAXED
     found = Lasting(part, lasts, cycles.amplitude, cycles=cycles)
     found.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
     changed = max(_surely(cycles.drift, shown.limits), _surely(cycles.detuning, shown.limits))
     off = abs(answers.amplitude - answers.amplitude_without_waves)
     turns = answers.period_without_waves * cycles.frequency
-    far = not off <= shown.limits.settled_within * answers.amplitude_without_waves  # also where it is not known
-    far |= math.isfinite(turns) and abs(turns - round(turns)) > _DRIFT * turns
+    whole = round(turns) if math.isfinite(turns) else 0
+    detuned = abs(turns - whole) / turns
+    apart = max(off / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / _DRIFT)
+    far = not apart <= 1.0  # also where it is not known
+    if lasts and not (answers.waves or shown.context.step or far) and whole == 1:
+        return _on_orbit(found, shown.fate.orbit)
     longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
-    if shift >= _SHIFTED:
-        step = shown.context.step * math.sqrt(_AIM * _SHIFTED / shift)
-        text = f"this vibration settles at only {rate:.2g} 1/s, and impacts of so few steps may shift it by"
-        text += f" {_IMPACT_AMPLITUDE_ERROR * shift:.0%}"
-        text += f": take a solver.step of {step:.2g} s, or a solver.tolerance"
-        found.longer = False
-    elif not lasts:
+    if not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
     elif not answers.waves and far:
         text = f"continued, this vibration comes to {answers.limit}: {longer}"
+        if shown.context.step and apart < math.inf:
+            finer = shown.context.step * math.sqrt(_AIM / apart)  # errors of impacts grow with its square
+            text += f"; if it stays as it is, its steps shift it: take a solver.step of {finer:.2g} s, or a"
+            text += " solver.tolerance"
     elif changed > _DRIFT:
         text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part: {longer}"
     elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
@@ -214,7 +213,9 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
 
     wander = cycles.evidence["frequency_spread"]
     spread = held(wander, cycles.frequency, cycles.detuning)
-    more = cycles.frequency_off + _IMPACT_FREQUENCY_ERROR * shift * cycles.frequency
+    more = cycles.frequency_off
+    if far and not answers.waves and math.isfinite(detuned):
+        more += detuned * cycles.frequency
     found.evidence["frequency_spread"] = min((wander if spread is None else spread) + more, cycles.frequency)
     found.frequency = cycles.frequency
     if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
@@ -222,13 +223,24 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         found.evidence |= {"frequency_spread": width, **in_lines(part, found.frequency)}
     short = seconds < shown.slowest(0.0) or abs(answers.level_change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends
-        found.spread = held(
-            cycles.amplitude_spread + _IMPACT_AMPLITUDE_ERROR * shift * cycles.amplitude,
-            cycles.amplitude,
-            cycles.drift,
-        )
+        found.spread = held(cycles.amplitude_spread, cycles.amplitude, cycles.drift)
         if far and not answers.waves and found.spread is not None and math.isfinite(off):
             found.spread += off
+    return found
+
+
+def _on_orbit(found: Lasting, orbit: Orbit | None) -> Lasting:
+    """The numbers of a motion that follows the equations and has come to its orbit: those of the orbit.
+
+    A scheme at a step has a motion of its own, which samples show.
+    """
+    if orbit is not None:
+        found.orbit = orbit
+        found.frequency = orbit.frequency
+        found.spread = orbit.error * orbit.amplitude
+        found.evidence["frequency_spread"] = orbit.error * orbit.frequency
+        found.evidence["stick_spread"] = orbit.error * orbit.stick_fraction
+        found.evidence["contact_loss_spread"] = orbit.error * orbit.contact_loss_fraction
     return found
 
 

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.analysis.fate import Fate, Kind
 from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
@@ -17,22 +18,12 @@ from brakecli.analysis.regime.seen import Seen
 from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
+from brakecli.solver.motion.phases import STICK
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Events, Track
 
 _NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
-
-
-class Continued(NamedTuple):
-    """What the motion comes to on the smooth wheel, in SI units; nan where it is no limit cycle."""
-
-    fate: Continuation = Continuation.UNKNOWN
-    amplitude: float = math.nan
-    level: float = math.nan  # standard deviation of vx
-    rate: float = math.nan  # at which its slowest disturbance fades
-    period: float = math.nan
-    sticks: float = math.nan  # in a period
 
 
 class Given(NamedTuple):
@@ -42,7 +33,7 @@ class Given(NamedTuple):
     context: Context  # what its case says
     exponent: Exponent | None = None  # of its small disturbances
     track: Track = UNTRACKED  # what the loop has noted
-    continued: Callable[[], Continued] = Continued  # what it comes to on the smooth wheel
+    continued: Callable[[], Fate] = lambda: Fate(Kind.UNKNOWN)  # what it comes to on the smooth wheel
     failure: str = ""  # why the run has failed
 
 
@@ -105,6 +96,11 @@ class Shown:
         last = self.samples - 1
         state = [float(self.history.read(name, last, self.samples)[0]) for name in ("x", "y", "vx", "vy")]
         return last * self.interval, np.array(state)
+
+    @cached_property
+    def fate(self) -> Fate:
+        """What the motion comes to on the smooth wheel."""
+        return self.given.continued()
 
     @cached_property
     def cycles(self) -> Cycles | None:
@@ -230,6 +226,22 @@ def answers(shown: Shown) -> Answers:
     return Answers(**found)
 
 
+def of_fate(fate: Fate) -> dict[str, Any]:
+    """The answers about what a motion comes to on the smooth wheel, by their names."""
+    if fate.lasts is None:
+        return {}
+    if (orbit := fate.orbit) is None:
+        return {"without_waves": Continuation.LASTS if fate.lasts else Continuation.DIES}
+    return {
+        "without_waves": Continuation.LASTS,
+        "amplitude_without_waves": orbit.amplitude,
+        "level_without_waves": orbit.level,
+        "rate_without_waves": fate.rate,
+        "period_without_waves": orbit.period,
+        "sticks_without_waves": float(orbit.word.count(STICK)) if orbit.word else math.nan,
+    }
+
+
 def _lasts(shown: Shown, found: Answers) -> bool:
     """Whether disturbances will grow as they do: they fade from a linear motion, or the level surely stays."""
     theory = shown.linear
@@ -242,9 +254,7 @@ def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
     context = shown.context
     found = dict[str, Any](growth_rate=shown.context.growth())
     if not context.frictionless:
-        alone = shown.given.continued()
-        names = ("without_waves", *(f"{name}_without_waves" for name in Continued._fields[1:]))
-        found |= dict(zip(names, alone, strict=True))
+        found |= of_fate(shown.fate)
     if waves:
         found |= shown.powers() | {"touches_in_sliding": context.touches()}
     if cycles := shown.cycles:

@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
+from brakecli.solver.motion.flow import Orbit
 
 FADED = 0.01
 """Part of the level of a damped vibration at its strongest that is nothing any more."""
@@ -67,3 +68,14 @@ class Verdict:
     def reasons(self) -> tuple[str, ...]:
         """Why the regime is as it is, and the notes."""
         return self.decision.sentence, *self.notes.values()
+
+
+def of_orbit(orbit: Orbit, radius: float) -> dict[str, Any]:
+    """The numbers of a verdict on a motion that has come to an orbit, by their names; radius in m."""
+    return {
+        "amplitude": orbit.amplitude,
+        "stick_fraction": orbit.stick_fraction,
+        "contact_loss_fraction": orbit.contact_loss_fraction,
+        "mean_friction_force": orbit.mean_force,
+        "braking_torque": radius * orbit.mean_force,
+    }

@@ -1,5 +1,6 @@
 """A motion on smooth pads as Python sees it: carried over a span, or followed to what becomes of it."""
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,8 +8,9 @@ from numpy.typing import NDArray
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
+from brakecli.solver.motion.orbit import CLOSED
 from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
-from brakecli.solver.motion.record import BELT, LOAD, MATRICES, V_X
+from brakecli.solver.motion.record import BELT, LOAD, MATRICES
 from brakecli.solver.motion.tasks import FLY, SEEK, SWING, advance
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
@@ -16,6 +18,9 @@ from brakecli.solver.system import System, longest_step
 
 FOREVER = 1e300
 """A time (s) that no motion reaches: finite, as a mode that decays does not grow in it at all."""
+
+Modes = tuple[NDArray[np.complex128], NDArray[np.complex128]]
+"""Eigenvalues of steady sliding (1/s), and the vectors of position and velocity in columns."""
 
 
 class Orbit(NamedTuple):
@@ -28,6 +33,9 @@ class Orbit(NamedTuple):
     state: tuple[float, ...]  # x, y, v_x and v_y at a place of it; at t = 0 of the waves where they force it
     word: tuple[int, ...]  # phases, from there
     times: tuple[float, ...]  # when they change, from there
+    level: float = math.nan  # standard deviation of vx, where it is known, m/s
+    mean_force: float = math.nan  # of the friction force, where it is known, N
+    error: float = math.nan  # part of its size by which a pursued orbit may be off
 
     @property
     def frequency(self) -> float:
@@ -117,7 +125,7 @@ class Pursuit:
         acting: tuple[float, float, float],
         state: Floats,
         rest: Floats,
-        modes: tuple[NDArray[np.complex128], NDArray[np.complex128]],
+        modes: Modes,
         duration: float = FOREVER,
     ) -> None:
         """Begin from a state (x, y, v_x, v_y), with what acts: the contact's stiffness (N/m), U (m/s), Q (N).
@@ -179,16 +187,18 @@ class Pursuit:
         x, y, v_y = o.point.tolist()
         period = float(o.period)
         spent = (path.spent / period).tolist()
-        word = path.word[: path.events + 1].tolist()
-        times = path.times[: path.events].tolist()
-        state = x, y, 0.0, v_y
-        return Orbit(period, float(o.amplitude), spent[STICK], spent[OPEN], state, tuple(word), tuple(times))
-
-    @property
-    def fastest(self) -> float:
-        """Largest v_x on the orbit over the wheel's speed."""
-        path = self.path
-        return float(max(path.low[V_X] / path.z[BELT], path.high[V_X] / path.z[BELT]))
+        return Orbit(
+            period=period,
+            amplitude=float(o.amplitude),
+            stick_fraction=spent[STICK],
+            contact_loss_fraction=spent[OPEN],
+            state=(x, y, 0.0, v_y),
+            word=tuple(path.word[: path.events + 1].tolist()),
+            times=tuple(path.times[: path.events].tolist()),
+            level=float(path.band),  # the root of the mean square: the mean of vx over a period is 0
+            mean_force=float(o.force),
+            error=CLOSED,
+        )
 
     @property
     def multiplier(self) -> float:

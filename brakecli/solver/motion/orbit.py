@@ -29,13 +29,14 @@ from brakecli.solver.tangent import MOST_POWERS
 
 GOING_ON, LINEAR, FOUND, ENDED = range(4)
 """What a motion has come to: nothing yet; no event can follow; an orbit; the end of the time, or of progress."""
+CLOSED = 1e-11
+"""Part of the size of a cycle by which an orbit may fail to close."""
 _FIRST = 3  # falls before an orbit is sought, and between two tries, which grow further apart
 _NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbit is sought
 _REACH = 0.1  # of the size of a cycle: step of Newton's iteration beyond which it may lead elsewhere
 _ROUNDS = 6
-_CLOSED = 1e-11  # of the size of a cycle, by which an orbit may fail to close
 _FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
-_UNSURE = 100.0  # times `_CLOSED`, by which returns may differ in any case
+_UNSURE = 100.0  # times `CLOSED`, by which returns may differ in any case
 _MANY = 1000  # more often no phase is entered in a cycle
 _CALLS = 2000  # turning points of a call: Python hears signals in between
 
@@ -144,13 +145,13 @@ def _closed(p: Plant, scratch: Floats, o: Any) -> bool:
         o.error = max(_sizes(o, x, y, v_y), TWO_PI * abs(o.late) / o.period)
         if not o.error < _REACH:
             return False
-        if o.error < _CLOSED:
+        if o.error < CLOSED:
             break
         at[0] += x
         at[1] += y
         at[2] += v_y
         o.period += o.by_point[0] * x + o.by_point[1] * y + o.by_point[2] * v_y
-    if o.error >= _CLOSED:
+    if o.error >= CLOSED:
         return False
     for i in range(3):  # does the last return follow from the one before it as M says?
         o.kept[i] = s[0, i] - at[i]
@@ -158,7 +159,7 @@ def _closed(p: Plant, scratch: Floats, o: Any) -> bool:
             o.kept[i] -= o.map[i, j] * (s[k, j] - at[j])
     was = _sizes(o, s[k, 0] - at[0], s[k, 1] - at[1], s[k, 2] - at[2])
     o.away = _sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
-    if not (_sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + _UNSURE * _CLOSED and was < _REACH):
+    if not (_sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + _UNSURE * CLOSED and was < _REACH):
         return False
     return _measured(p, scratch, o)
 
