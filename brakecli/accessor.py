@@ -16,7 +16,7 @@ import xarray as xr
 
 from brakecli.analysis.over_time import Vibration
 from brakecli.analysis.probability import Probability
-from brakecli.analysis.regime.bursts import Burst
+from brakecli.analysis.signals.bursts import Burst
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete
 from brakecli.errors import BrakecliError

@@ -10,8 +10,8 @@ from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 
 if TYPE_CHECKING:
-    from brakecli.analysis.regime.of_signal import SignalLook
-    from brakecli.analysis.regime.signal_table import SignalThresholds
+    from brakecli.analysis.signals.look import SignalLook
+    from brakecli.analysis.signals.table import SignalThresholds
 
 NUMBERS = ("sample_rate", "belt_speed", "stiffness")
 
@@ -57,9 +57,9 @@ class Measured:
 
     def look_at(self, source: str, thresholds: "SignalThresholds | None" = None) -> "SignalLook":
         """What the signal of a file shows."""
-        from brakecli.analysis.regime.of_signal import Measurand, look
-        from brakecli.analysis.regime.signal_file import read_signal
-        from brakecli.analysis.regime.signal_table import SignalThresholds
+        from brakecli.analysis.signals.look import Measurand, look
+        from brakecli.analysis.signals.read import read_signal
+        from brakecli.analysis.signals.table import SignalThresholds
 
         name = self.quantity_of(source)
         reading = asdict(self)

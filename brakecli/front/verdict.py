@@ -24,7 +24,7 @@ def verdict_on(source: str, measured: Measured, thresholds: list[str] | None) ->
     quantity = measured.quantity_of(source)
     if quantity is None:
         return _on_result(source, thresholds)
-    from brakecli.analysis.regime.signal_table import SignalThresholds
+    from brakecli.analysis.signals.table import SignalThresholds
 
     found = measured.look_at(source, changed(SignalThresholds, thresholds)).verdict
     numbers = {**dataclasses.asdict(found), "bursts": [tone.numbers() for tone in found.bursts]}

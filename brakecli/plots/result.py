@@ -14,7 +14,7 @@ from brakecli.files.read import StoredResult, open_result
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from brakecli.analysis.regime.of_signal import SignalLook
+    from brakecli.analysis.signals.look import SignalLook
 
 
 def plot_result(

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.of_signal import Measurand, SignalLook
+from brakecli.analysis.signals.look import Measurand, SignalLook
 from brakecli.analysis.spectrum import segment
 from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.decision import Regime
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
+from brakecli.analysis.signals.look import Measurand, Signal, SignalVerdict, look
 
 Array = NDArray[np.float64]
 

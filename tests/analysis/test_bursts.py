@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.bursts import bursts
-from brakecli.analysis.regime.cleaning import cleaned
 from brakecli.analysis.regime.decision import Regime
-from brakecli.analysis.regime.of_signal import Measurand, Signal, look
+from brakecli.analysis.signals.bursts import bursts
+from brakecli.analysis.signals.cleaning import cleaned
+from brakecli.analysis.signals.look import Measurand, Signal, look
 from tests.campaign import campaign
 
 RATE = 20000.0

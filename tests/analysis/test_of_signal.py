@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.decision import Excitation, Regime
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
-from brakecli.analysis.regime.signal_table import SignalThresholds
+from brakecli.analysis.signals.look import Measurand, Signal, SignalVerdict, look
+from brakecli.analysis.signals.table import SignalThresholds
 from tests.analysis.measured_signals import (
     Array,
     clipped,

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
-from brakecli.analysis.regime import signal_file
-from brakecli.analysis.regime.of_signal import Measurand, Signal, look
-from brakecli.analysis.regime.signal_file import read_signal
+from brakecli.analysis.signals import read as signal_file
+from brakecli.analysis.signals.look import Measurand, Signal, look
+from brakecli.analysis.signals.read import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
 
 

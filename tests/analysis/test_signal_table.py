@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, look
-from brakecli.analysis.regime.signal_table import ROWS, SignalAnswers, SignalThresholds, decide
+from brakecli.analysis.signals.look import Measurand, Signal, look
+from brakecli.analysis.signals.table import ROWS, SignalAnswers, SignalThresholds, decide
 from brakecli.files.fields import evidence_unit
 from tests.analysis.measured_signals import Array, clipped, measured, stick_slip
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.decision import Regime
-from brakecli.analysis.regime.of_signal import Measurand, Signal, SignalVerdict, look
+from brakecli.analysis.signals.look import Measurand, Signal, SignalVerdict, look
 from tests.analysis.measured_signals import Array
 from tests.campaign import counts
 

@@ -359,7 +359,7 @@ def test_a_sweep_without_a_search_waits_for_no_kernels_of_branches(tmp_path: Pat
 def test_a_measured_signal_waits_for_no_compiled_code(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "signal.csv", np.sin(0.1 * np.arange(2000.0)))
     loaded = loaded_by(["classify", "signal.csv", "--sample-rate", "1e3", "--quantity", "displacement"], tmp_path)
-    assert "brakecli.analysis.regime.of_signal" in loaded
+    assert "brakecli.analysis.signals.look" in loaded
     assert loaded.isdisjoint({"numba", "h5py", "scipy.signal", "scipy.stats", "scipy.optimize", "matplotlib"})
 
 

@@ -14,8 +14,8 @@ import h5py
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Measurand
-from brakecli.analysis.regime.signal_file import read_signal
+from brakecli.analysis.signals.look import Measurand
+from brakecli.analysis.signals.read import read_signal
 from brakecli.errors import UnreadableResultError
 from brakecli.files import read
 from brakecli.files.as_xarray import opened as as_xarray

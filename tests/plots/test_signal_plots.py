@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal, look
+from brakecli.analysis.signals.look import Measurand, Signal, look
 from brakecli.plots.signal import draw
 from brakecli.plots.style import applied
 from tests.plots.helpers import line

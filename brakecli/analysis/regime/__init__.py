@@ -1,1 +1,1 @@
-"""Damped, relaxation or quasi-harmonic: the regime of a run or of a measured signal, with its evidence."""
+"""Damped, relaxation or quasi-harmonic: the regime of a run, with its evidence."""

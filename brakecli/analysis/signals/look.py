@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.bursts import Burst, bursts
-from brakecli.analysis.regime.cleaning import Velocity, cleaned, without_drift, without_spikes
 from brakecli.analysis.regime.decision import Excitation, Regime
-from brakecli.analysis.regime.signal_measure import Heard, answers
-from brakecli.analysis.regime.signal_table import SignalThresholds, decide
-from brakecli.analysis.regime.stick import Slips, seek
+from brakecli.analysis.signals.bursts import Burst, bursts
+from brakecli.analysis.signals.cleaning import Velocity, cleaned, without_drift, without_spikes
+from brakecli.analysis.signals.measure import Heard, answers
+from brakecli.analysis.signals.slips import Slips, seek
+from brakecli.analysis.signals.table import SignalThresholds, decide
 from brakecli.analysis.spectrum import Array
 
 _MOST_OF_IT = 0.9  # of the record: bursts that fill as much are the record

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.of_signal import Measurand, Signal
+from brakecli.analysis.signals.look import Measurand, Signal
 from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.faces import argument

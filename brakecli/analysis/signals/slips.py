@@ -12,9 +12,9 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from brakecli.analysis.regime.cleaning import DEVIATION, Velocity
-from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES
 from brakecli.analysis.regime.spectra import rises
+from brakecli.analysis.signals.cleaning import DEVIATION, Velocity
+from brakecli.analysis.signals.table import FEWEST_SAMPLES
 from brakecli.analysis.spectrum import Array
 
 _PARTS = 7

@@ -1,4 +1,4 @@
-"""The record of answers to the questions of `signal_table`, from a velocity and its slips."""
+"""The record of answers to the questions of `table`, from a velocity and its slips."""
 
 import math
 from functools import cached_property
@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.cleaning import CERTAIN, Velocity
 from brakecli.analysis.regime.evidence import WINDOWS, level_change
-from brakecli.analysis.regime.signal_table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
 from brakecli.analysis.regime.spectra import line_share
-from brakecli.analysis.regime.stick import Slips
+from brakecli.analysis.signals.cleaning import CERTAIN, Velocity
+from brakecli.analysis.signals.slips import Slips
+from brakecli.analysis.signals.table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
 from brakecli.analysis.spectrum import Array, interpolated
 
 _FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
