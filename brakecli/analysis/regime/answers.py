@@ -5,15 +5,14 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from brakecli.analysis.regime.decision import told
+from brakecli.analysis.regime.decision import Thresholds, told
 
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 FADED = 3.0  # powers of e after which a change has ended: 5 % of it are left
-_TOLD = 3.0  # errors of an exponent beyond which it is told from 0
 _TWICE = 2.0  # times as long, at least, that a run is asked to be; a choice
 _MOST_TIMES = 16.0  # and at most; a choice
-_SETTLED = 1.4  # a run over its settled part, where it is told how long it has to be; a choice
+LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 
 
 RENAMED = {
@@ -168,7 +167,7 @@ class Answers(NamedTuple):
     @property
     def told_apart(self) -> float:
         """Duration after which an exponent is told from 0, as its error falls with the square root of the time."""
-        errors = _TOLD * self.lyapunov_error / max(abs(self.lyapunov_exponent), 1e-300)
+        errors = Thresholds.sure_errors * self.lyapunov_error / max(abs(self.lyapunov_exponent), 1e-300)
         times = min(errors, math.sqrt(_MOST_TIMES)) ** 2
         return QUARTER * self.duration * max(times, _TWICE)
 
@@ -198,7 +197,7 @@ class Answers(NamedTuple):
     @property
     def two_waves(self) -> float:
         """Duration whose settled part holds two periods of the slowest wave."""
-        return 2.0 * _SETTLED * self.slowest_wave_period
+        return 2.0 * LONGER * self.slowest_wave_period
 
     @property
     def lines(self) -> str:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from brakecli.analysis.regime.answers import LONGER
 from brakecli.analysis.regime.cycles import Cycles
 from brakecli.analysis.regime.evidence import LAST, WINDOWS, Part, trend
 from brakecli.analysis.regime.measure import Shown
@@ -18,7 +19,6 @@ from brakecli.solver.motion.flow import Orbit
 
 RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
 _REST = 0.3  # of a forced motion, by which its closed form may be off
-_LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
 _STAYS = 0.25  # part of the expected decay; what decays by less of it in the second half does not decay
 _ABOVE = 1.2  # times what is left in the last quarter: windows below that hold no more than is left
 ROOM = 1.05  # a requested run is longer than needed by this, so that it holds whole samples and windows
@@ -122,7 +122,7 @@ def _closed(shown: Shown, theory: Linear, decay: float, forced: float, gone: _Go
         found.settled = True
     else:
         late = shown.duration + _wait(decay, gone)
-        needed = max(_LONGER * late, ROOM * (late + 2.0 * slow))
+        needed = max(LONGER * late, ROOM * (late + 2.0 * slow))
         found.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
     seconds = shown.duration - max(min(shown.quarter * shown.interval, shown.duration - slow), 0.0)
     if (beat := shown.beat()) > seconds and theory.opens:

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import Part, level_change
+from brakecli.analysis.regime.evidence import GROUPS, Part, level_change
 from brakecli.analysis.regime.spectra import rises
 from brakecli.analysis.spectrum import Array
 from brakecli.solver.track import LIFT, MIN, SLIP, STICK, TOUCH, Events
@@ -13,7 +13,6 @@ from brakecli.solver.track import LIFT, MIN, SLIP, STICK, TOUCH, Events
 _HARMONICS = 5
 _MOST_RISES_PER_CYCLE = 4
 _FEWEST = 3  # cycles in which a drift can be told from their spread
-_GROUPS = 10  # of neighbouring cycles, of which a median is taken
 _MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
 # Of the standard deviation of vx, in the mean of a rise. A slower rise is ripple.
 _BANDS: tuple[float, ...] = 0.2, 0.35, 0.6, 0.1
@@ -72,7 +71,7 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
         return None
     cycles = len(begins) - 1
     interval = part.history.interval
-    edges = np.linspace(0, cycles, min(cycles, _GROUPS) + 1).astype(int)
+    edges = np.linspace(0, cycles, min(cycles, GROUPS) + 1).astype(int)
     groups = begins[edges]
     period, period_spread = median(np.diff(groups) / np.diff(edges))
     sticks = np.histogram(events.time[events.kind == STICK], begins - _EARLY * period)[0]

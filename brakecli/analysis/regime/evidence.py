@@ -22,7 +22,7 @@ LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the 
 _MOST_LINES = 8
 _LEAST_LINE = 1e-3  # part of the energy
 _MOST_PLACES = 1 << 16  # samples at which a forced motion is computed
-_BATCHES = 10
+GROUPS = 10  # of neighbouring values, whose means or medians are taken
 FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
 _MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told from what lies beside them
 _LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
@@ -246,7 +246,7 @@ def level_change(levels: Array) -> tuple[Any, Any]:
     The error is that of the means of ten batches, or of three levels or more where there are fewer.
     """
     count = levels.shape[-1]
-    batches = min(_BATCHES, count)
+    batches = min(GROUPS, count)
     means = levels[..., count % batches :].reshape(*levels.shape[:-1], batches, -1).mean(axis=-1)
     positive = means.min(axis=-1, keepdims=True) > 0.0
     return trend(np.log(np.where(positive, means, math.nan)))
