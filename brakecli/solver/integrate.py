@@ -18,7 +18,7 @@ from brakecli.solver.method import Method
 from brakecli.solver.motion.record import BY_NODES, BY_STEPS
 from brakecli.solver.plant import PLANT
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import COEFFICIENTS, GRID, WEIGHTS, Pair, filled, one
+from brakecli.solver.records import COEFFICIENTS, EVENT, GRID, MOST_EVENTS, WEIGHTS, Pair, filled, one
 from brakecli.solver.roughness import turn_wheel
 from brakecli.solver.schedules import Schedule, integral_at, slope_at
 from brakecli.solver.steady_sliding import off_by_nodes, steady_sliding
@@ -133,7 +133,9 @@ class Stepping:
         self.work = Work()
         self.events = np.zeros((EVENTS, 2))
         drive = system.belt, system.load
-        self.contact = build_layer(system.evaluator, system.pad, moving=True, room=sum(map(len, drive)))
+        self._kept = EVENT * MOST_EVENTS if system.tracked else 0
+        room = sum(map(len, drive)) + self._kept
+        self.contact = build_layer(system.evaluator, system.pad, moving=True, room=room)
         plants = one(PLANT)
         self.plant = plant = plants[0]
         plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
@@ -162,7 +164,7 @@ class Stepping:
             plant.block.columns[BY_NODES, :2] = self._off
             self.tangent.most = system.most_error
         if system.tracked:
-            follow(self.plant.track, self.state.v_x)
+            follow(self.plant.track, self.state.v_x, int(plant.drive.load_end))
         self._start_energy = self._energy()
 
     def run(
@@ -200,7 +202,14 @@ class Stepping:
         found = exponents(self.tangent.logs[:, None], self.system.sampled_duration)[0] if carried else None
         track = None
         if self.system.tracked:
-            track = tracked(self.plant.track, self.plant.c, self.plant.s, self.scheme.mechanical_energy, light)
+            track = tracked(
+                self.plant.track,
+                self.contact.scratch,
+                self.plant.c,
+                self.plant.s,
+                self.scheme.mechanical_energy,
+                light,
+            )
         own = None
         if self.tangent.knows == 1:
             grown = (
@@ -229,13 +238,13 @@ class Stepping:
         return rows if done == stop - lag else rows[: -(-done // per_sample) + (-first // per_sample)]
 
     def _place(self, drive: Any, belt: Schedule, load: Schedule) -> None:
-        """Put the knots of speed and load at the end of the scratch."""
+        """Put the knots of speed and load behind what the contact takes of the scratch; events follow them."""
         scratch = self.contact.scratch
-        drive.load_end = len(scratch)
-        drive.belt_end = drive.load_at = len(scratch) - len(load)
+        drive.load_end = len(scratch) - self._kept
+        drive.belt_end = drive.load_at = drive.load_end - len(load)
         drive.belt_at = drive.belt_end - len(belt)
         scratch[drive.belt_at : drive.belt_end] = belt
-        scratch[drive.load_at :] = load
+        scratch[drive.load_at : drive.load_end] = load
 
     def last_row(self) -> Floats:
         """The sample at the last level."""

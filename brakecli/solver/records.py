@@ -113,6 +113,9 @@ TANGENT = record(
 MOST_EVENTS = 1 << 15
 """Events of a run that are kept, the last ones."""
 
+EVENT = 6
+"""Numbers of each: time (s), kind, x (m), then y, v_x and v_y (m and m/s) of all but turning points."""
+
 TRACK = record(
     "way",  # sign of the last velocity v_x that was not 0
     "since",  # latest time of an event that is no longer kept, s
@@ -128,10 +131,7 @@ TRACK = record(
         float,
         (PARTS + 1, 7),
     ),  # there: x, y, v_x, v_y, x_old and y_old (m and m/s), energy of the contact (J)
-    event_times=(float, MOST_EVENTS),  # s
-    event_places=(float, MOST_EVENTS),  # x, m
-    event_others=(float, (MOST_EVENTS, 3)),  # y, v_x and v_y, of all but turning points, m and m/s
-    event_kinds=(np.int8, MOST_EVENTS),
+    events_at=int,  # where in the scratch they are kept
 )
 """What a loop notes of a motion beside its samples, see `solver.track`."""
 

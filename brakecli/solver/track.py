@@ -22,7 +22,7 @@ from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.energy import Mechanical
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import phases
-from brakecli.solver.records import MOST_EVENTS, PARTS, Weights
+from brakecli.solver.records import EVENT, MOST_EVENTS, PARTS, Weights
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH, TURN = range(7)
 """Kinds of events: turning points of x, begin and end of a stick, end and begin of contact, and sliding that turns
@@ -130,15 +130,18 @@ UNTRACKED = Track(
 """Track of a motion of which nothing has been noted."""
 
 
-def follow(t: Any, v_x: float) -> None:
-    """Note all from the start on, with the velocity there (m/s)."""
+def follow(t: Any, v_x: float, events_at: int) -> None:
+    """Note all from the start on, with the velocity there (m/s); events are kept there in the scratch."""
     t.on = 1
+    t.events_at = events_at
     t.phase = phases.UNDECIDED
     t.way = np.sign(v_x)
     t.since = -math.inf
 
 
-def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool) -> Track:
+def tracked(
+    t: Any, scratch: Floats, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool
+) -> Track:
     """What has been noted; `light` where the work of the roughness lacks the change of the contact's store."""
     x, y, v_x, v_y, x_old, y_old, contact = t.states[: t.marks].T.copy()
     state = SimpleNamespace(x=x, y=y, v_x=v_x, v_y=v_y, x_old=x_old, y_old=y_old)
@@ -147,8 +150,10 @@ def tracked(t: Any, c: Coefficients, s: Weights, energies: Callable[..., Mechani
     if light:
         works[:, 4] += contact - contact[:1]
     n = min(int(t.events), MOST_EVENTS)
-    order = np.argsort(t.event_times[:n], kind="stable")
-    kept = Events(t.event_times[order], t.event_kinds[order], t.event_places[order], t.event_others[order])
+    events = scratch[t.events_at : t.events_at + EVENT * n].reshape(n, EVENT)
+    events = events[np.argsort(events[:, 0], kind="stable")]
+    time, kind, place = events[:, :3].T.copy()
+    kept = Events(time, kind.astype(np.int8), place, events[:, 3:].copy())
     stored = np.column_stack([kinetic, links, contact])
     states = np.column_stack([x, y, v_x, v_y])
     return Track(t.times[: t.marks].copy(), works, stored, states, t.counts.copy(), float(t.since), kept)
@@ -174,20 +179,20 @@ def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float
 
 
 @kernel(inline=False)
-def put(t: Any, kind: int, time: float, x: float) -> None:
+def put(t: Any, scratch: Floats, kind: int, time: float, x: float) -> None:
     """Note an event; the last ones are kept."""
-    at = t.events % MOST_EVENTS
+    at = t.events_at + EVENT * (t.events % MOST_EVENTS)
     if t.events >= MOST_EVENTS:
-        t.since = max(t.since, t.event_times[at])
-    t.event_times[at] = time
-    t.event_kinds[at] = kind
-    t.event_places[at] = x
+        t.since = max(t.since, scratch[at])
+    scratch[at] = time
+    scratch[at + 1] = kind
+    scratch[at + 2] = x
     t.events += 1
     t.counts[kind] += 1
 
 
 @kernel(inline=False)
-def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
+def enter(t: Any, scratch: Floats, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """Note the events with which a phase begins, and the motion there; the first one begins without any."""
     was = t.phase
     t.phase = phase
@@ -195,20 +200,20 @@ def enter(t: Any, phase: int, time: float, x: float, y: float, v_x: float, v_y: 
     if was == phases.UNDECIDED or was == phase:
         return
     if was == phases.STICK:
-        put(t, SLIP, time, x)
+        put(t, scratch, SLIP, time, x)
     if phase == phases.OPEN:
-        put(t, LIFT, time, x)
+        put(t, scratch, LIFT, time, x)
     elif was == phases.OPEN:
-        put(t, TOUCH, time, x)
+        put(t, scratch, TOUCH, time, x)
     if phase == phases.STICK:
-        put(t, STICK, time, x)
+        put(t, scratch, STICK, time, x)
     if t.events == before:  # from one side to the other
-        put(t, TURN, time, x)
-    for at in range(before, t.events):
-        others = t.event_others[at % MOST_EVENTS]
-        others[0] = y
-        others[1] = v_x
-        others[2] = v_y
+        put(t, scratch, TURN, time, x)
+    for event in range(before, t.events):
+        at = t.events_at + EVENT * (event % MOST_EVENTS)
+        scratch[at + 3] = y
+        scratch[at + 4] = v_x
+        scratch[at + 5] = v_y
 
 
 @kernel

@@ -53,13 +53,13 @@ def begin(p: Plant, scratch: Floats) -> None:
 
 
 @kernel(inline=False)
-def _note(p: Plant) -> None:
+def _note(p: Plant, scratch: Floats) -> None:
     """Note what there is to note of the last step."""
     m = p.block
     if m.measures == 1:
         extent.note(p.exact, m)
     if p.track.on == 1:
-        extent.note_turn(p.exact, m, p.track)
+        extent.note_turn(p.exact, m, p.track, scratch)
 
 
 @kernel(inline=False)
@@ -84,13 +84,13 @@ def _part_step(p: Plant, scratch: Floats, left: float) -> int:
             exact.add_works(p.c, e, m, p.work)
             pass_knot(p, scratch, m.knot)
         exact.look(e, m.phase, m.z)
-        _note(p)
+        _note(p, scratch)
         return DONE
-    _note(p)
+    _note(p, scratch)
     if m.account == 1:
         exact.add_works(p.c, e, m, p.work)
     ends: int = pass_event(p, scratch)
-    note_phase(p, m.phase)
+    note_phase(p, scratch, m.phase)
     return ends
 
 
@@ -134,7 +134,7 @@ def advance(p: Plant, scratch: Floats, until: float, turns: bool) -> int:
                     exact.add_works(p.c, e, m, p.work)
             columns.carry(e, m)
             if m.measures == 1 or (p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0):
-                _note(p)
+                _note(p, scratch)
         else:
             ends = _part_step(p, scratch, left)
         if m.which == NO_EVENT and until - m.time <= _WHOLE * m.h:

@@ -108,11 +108,11 @@ def pass_knot(p: Plant, scratch: Floats, t: float) -> None:
 
 
 @kernel
-def note_phase(p: Plant, phase: int) -> None:
+def note_phase(p: Plant, scratch: Floats, phase: int) -> None:
     """Note the events with which a phase begins at the motion reached; without contact it is flight."""
     m = p.block
     if p.track.on == 1:
-        enter(p.track, phase, m.base + m.time, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y])
+        enter(p.track, scratch, phase, m.base + m.time, m.z[X], m.z[Y], m.z[V_X], m.z[V_Y])
 
 
 @kernel(inline=False)

@@ -3,6 +3,7 @@
 import math
 from typing import Any
 
+from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact
 from brakecli.solver.motion.cubic import lowest
@@ -43,7 +44,7 @@ def zero_of_velocity(e: Any, m: Any) -> float:
 
 
 @kernel(inline=False)
-def note_turn(e: Any, m: Any, track: Any) -> None:
+def note_turn(e: Any, m: Any, track: Any, scratch: Floats) -> None:
     """Note a turning point in the last step."""
     kind = turned(track, m.z[V_X])
     if kind < 0:
@@ -53,7 +54,7 @@ def note_turn(e: Any, m: Any, track: Any) -> None:
     if m.begin[V_X] * m.z[V_X] < 0.0:
         part = zero_of_velocity(e, m)
         place = e.at[X]
-    put(track, kind, m.base + m.time + (part - m.part) * m.span, place)
+    put(track, scratch, kind, m.base + m.time + (part - m.part) * m.span, place)
 
 
 @kernel(inline=False)

@@ -154,7 +154,7 @@ def _passed(p: Plant, item: int) -> float:
 
 
 @kernel(inline=False)
-def _meet(p: Plant) -> None:
+def _meet(p: Plant, scratch: Floats) -> None:
     """Note where in the step that has been made a rough pad comes to the wheel or leaves it.
 
     A contact that vanishes has a force that grows with its age to the power 3/2, so that its age is 3/2 F/|dF/dt|.
@@ -172,6 +172,7 @@ def _meet(p: Plant) -> None:
     theta = 1.0 - part if meets else part
     enter(
         p.track,
+        scratch,
         m.phase if meets else OPEN,
         m.base + m.time + theta * r.length,
         interpolated(r, X, theta),
@@ -182,7 +183,7 @@ def _meet(p: Plant) -> None:
 
 
 @kernel(inline=False)
-def _follow(p: Plant) -> None:
+def _follow(p: Plant, scratch: Floats) -> None:
     """Note a turning point on the continuous solution of the step that has been made, and what the pad does."""
     m = p.block
     r = p.runge
@@ -198,9 +199,9 @@ def _follow(p: Plant) -> None:
             theta = min(max(theta - velocity / slope, 0.0), 1.0) if slope != 0.0 else theta
             if abs(theta - before) < _NEAR:
                 break
-        put(track, kind, m.base + m.time + theta * r.length, interpolated(r, X, theta))
+        put(track, scratch, kind, m.base + m.time + theta * r.length, interpolated(r, X, theta))
     if (r.touch[END_STAGE, 1] > 0.0) == (track.phase == OPEN):
-        _meet(p)
+        _meet(p, scratch)
 
 
 @kernel(inline=False)
@@ -210,7 +211,7 @@ def _take(p: Plant, tables: Floats, scratch: Floats, h: float, last: bool) -> No
     r = p.runge
     work = p.work
     if p.track.on == 1:
-        _follow(p)
+        _follow(p, scratch)
     work.belt += h * _passed(p, 0)
     work.friction += h * _passed(p, 1)
     work.dashpots += h * _passed(p, 2)
@@ -308,5 +309,5 @@ def step(p: Plant, tables: Floats, scratch: Floats) -> int:
         return _STALLED
     if m.which == HEIGHT:
         act_first(p, tables, scratch)
-    note_phase(p, m.phase if r.touch[0, 1] > 0.0 else OPEN)
+    note_phase(p, scratch, m.phase if r.touch[0, 1] > 0.0 else OPEN)
     return _NONE

@@ -110,7 +110,7 @@ def sample(p: Plant, tables: Floats, scratch: Floats, row: Floats) -> None:
 
 
 @kernel(inline=False)
-def _note(p: Plant, phase: int, v_before: float) -> None:
+def _note(p: Plant, scratch: Floats, phase: int, v_before: float) -> None:
     """Note the events of the step that has been taken, see `solver.track`.
 
     `phase` is what its solution says, v_before the velocity before (m/s). A phase begins in the middle of the
@@ -137,13 +137,13 @@ def _note(p: Plant, phase: int, v_before: float) -> None:
         ago = 0.5 * h
         if phase != STICK:
             ago += (1.0 - lag - p.grid.weighted) * h
-        enter(track, phase, time - ago, x - ago * v_x, y - ago * state.v_y, v_x, state.v_y)
+        enter(track, scratch, phase, time - ago, x - ago * v_x, y - ago * state.v_y, v_x, state.v_y)
     if phase == STICK:
         v_x = problem.belt
     kind = turned(track, v_x)
     if kind >= 0:
         rest = h * v_x / (v_x - v_before) if v_before * v_x <= 0.0 else 0.0
-        put(track, kind, time - rest, x - 0.5 * rest * v_x)
+        put(track, scratch, kind, time - rest, x - 0.5 * rest * v_x)
 
 
 @entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
@@ -208,7 +208,7 @@ def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: 
         if track.on == 1:
             phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
             if phase != track.phase or not state.v_x * track.way > 0.0:
-                _note(p, phase, v_before)
+                _note(p, scratch, phase, v_before)
         part += 1
         if part == grid.per_sample:
             sampled = sampled + 1
