@@ -1,17 +1,17 @@
 """Where along a number steady sliding loses its stability, or has it again: one search for whoever asks.
 
 A margin says at each value what is positive where sliding is stable, with the rounding of each: the conditions of
-Routh and Hurwitz, the load that is left on the contact, or how far a scheme's factor is below one.
+Routh and Hurwitz, the load that is left on the contact, or how far a scheme's factor is below one. Of motions that
+are measured, or followed, each value has only a side: unstable, stable, or not known.
 """
 
 import math
 import statistics
-from collections.abc import Callable, Iterator, Sequence
-from itertools import pairwise
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 from brakecli.analysis.stability.certain import EPSILON, Rounded
-from brakecli.analysis.stability.search import bisect
+from brakecli.analysis.stability.search import HALVINGS, bisect
 from brakecli.solver.roots import bracketed_root
 
 Margin = Callable[[float], Sequence[Rounded] | None]
@@ -34,13 +34,14 @@ class Change(NamedTuple):
     """A value at which stability is lost as it grows, or regained.
 
     Beyond the error its side is sure, whatever rounding does. `which` of the margin passes zero; None where steady
-    sliding itself ends.
+    sliding itself ends, or only sides are known. What is not `known` may be anywhere within the error, or nowhere.
     """
 
     value: float
     error: float
     lost: bool
-    which: int | None
+    which: int | None = None
+    known: bool = True
 
 
 def grows(signs: Sequence[Rounded] | None) -> bool:
@@ -70,17 +71,67 @@ def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iter
     taken nothing is asked.
     """
     sides = ((value, grows(margin(value))) for value in values)
-    for (low, before), (high, after) in pairwise(sides):
-        if before is not after:
-            yield _located(margin, low, high, width, values[-1] if before else values[0])
+
+    def located(low: float, high: float, lost: bool) -> Change:
+        return _located(margin, low, high, lost, width, values[0] if lost else values[-1])
+
+    return joined(sides, values[-1], located)
 
 
-def _located(margin: Margin, low: float, high: float, width: float, bound: float) -> Change:
+def between_known(
+    unstable: Callable[[float], bool | None], values: Sequence[float], width: float, halvings: int = HALVINGS
+) -> Iterator[Change]:
+    """The changes between neighbours of rising values, by what may say None of a value: that it is not known.
+
+    Each bracket goes from the last known value before a change to the first one after it. It is a width wide, or
+    so many halvings are made towards both ends of what is not known.
+    """
+
+    def located(low: float, high: float, lost: bool) -> Change:
+        def as_below(value: float) -> bool | None:
+            return None if (side := unstable(value)) is None else side is not lost
+
+        low, high = bisect(as_below, low, high, width=width)
+        middle = 0.5 * (low + high)  # it is not known, where that is still wider
+        low, _ = bisect(lambda value: as_below(value) is True, low, middle, width=width, halvings=halvings)
+        _, high = bisect(lambda value: as_below(value) is not False, middle, high, width=width, halvings=halvings)
+        return Change(0.5 * (low + high), 0.5 * (high - low), lost)
+
+    return joined(((value, unstable(value)) for value in values), values[-1], located)
+
+
+def joined(
+    sides: Iterable[tuple[float, bool | None]], last: float, located: Callable[[float, float, bool], Change]
+) -> Iterator[Change]:
+    """The changes along rising values up to the last, each with whether it is unstable; None where nobody knows.
+
+    `located` finds the one between two known ones, at which stability is lost, or not. Stability may be lost where
+    nothing is known: a window may then begin, or end, anywhere there.
+    """
+    each = iter(sides)
+    low, before = next(each)
+    hidden = before is None
+    for high, after in each:
+        hidden = hidden or after is None
+        if after is None and high != last:
+            continue
+        if {before, after} == {False, True}:
+            yield located(low, high, after is True)
+        elif hidden:
+            if not before:
+                yield Change(low, high - low, lost=True, known=False)
+            if not after and (before, after) != (False, None):  # otherwise the bound cuts it
+                yield Change(high, high - low, lost=False, known=False)
+        low = high
+        before = after
+        hidden = False
+
+
+def _located(margin: Margin, low: float, high: float, lost: bool, width: float, bound: float) -> Change:
     """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does.
 
     Where rounding hides the side of the stable end as well, the bracket reaches on, up to a bound.
     """
-    lost = grows(margin(high))
     low, high = _narrowed(margin, low, high, lost, width)
     low, high = bisect(lambda value: grows(margin(value)) is not lost, low, high, width=width)
     stable = low if lost else high

@@ -37,7 +37,7 @@ from brakecli.sweeps.lyapunov import Steady, by_exponents
 from brakecli.sweeps.read_off import PART, explored, on_waves
 from brakecli.sweeps.sustained import sustained
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Edge, Outcome, Search, of_edges
+from brakecli.sweeps.windows import Outcome, Search, of_changes
 
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
@@ -172,8 +172,8 @@ def _by_eigenvalues(
     def searched(margin: Margin, values: list[float], off: Callable[[Change], float]) -> Search:
         if all(steady_at(value) is None for value in values):
             return Search(Outcome.NO_SLIDING)
-        edges = [Edge(each.value, each.error + off(each)) for each in between(margin, values, width)]
-        return of_edges(critical, grows(margin(critical.lower)), edges)
+        found = (each._replace(error=each.error + off(each)) for each in between(margin, values, width))
+        return of_changes(critical, grows(margin(critical.lower)), found)
 
     values = scanned(SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
     exact = searched(signs_at, places(signs_at, sorted({*values, *inner})), by_the_mean)

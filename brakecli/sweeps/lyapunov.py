@@ -7,11 +7,11 @@ error bar. In full contact the motion is linear, and theory gives the growth.
 import math
 from collections.abc import Callable
 from functools import cache
-from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.stability.search import bisect
+from brakecli.analysis.margin import between_known
+from brakecli.analysis.stability.certain import Rounded
 from brakecli.solver.arrays import Floats
 from brakecli.solver.motion.rough import RoughFlow, Status, default_cells, default_steps
 from brakecli.solver.period import LONGEST
@@ -19,7 +19,7 @@ from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.solver.system import System
 from brakecli.sweeps.read_off import in_full_contact
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Edge, Outcome, Piece, Search, joined
+from brakecli.sweeps.windows import Outcome, Search, of_changes
 
 VALUES = 33  # of the parameter, between which a change is looked for
 EDGES = 4  # halvings towards the ends of a range in which the answer is not known
@@ -34,18 +34,6 @@ CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's
 Steady = Callable[[float], tuple[System, SteadySliding] | None]
 
 
-class Exponent(NamedTuple):
-    """Lyapunov's exponent (1/s), and an error that it hardly exceeds."""
-
-    rate: float
-    error: float
-
-    @property
-    def unstable(self) -> bool | None:
-        """Whether disturbances grow; None where zero lies within the error."""
-        return None if abs(self.rate) <= self.error else self.rate > 0.0
-
-
 def length(system: System) -> float:
     """The time (s) of a segment: two periods of the slowest mode, or the passing of the longest wave."""
     slow = system.natural_frequencies[0]
@@ -58,10 +46,10 @@ def exponent_length(system: System) -> float:
     return (TRANSIENT + BATCHES * BATCH) * length(system)
 
 
-def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Exponent | None:
-    """Lyapunov's exponent of the motion from steady sliding, by means over batches of a long run.
+def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Rounded | None:
+    """Lyapunov's exponent (1/s) of the motion from steady sliding, by means over batches of a long run.
 
-    A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing:
+    It is hardly off by more than its error. A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing:
     that part is left out. None where too little is left. The maps of a `linear` motion hardly change: there the
     eigenvalues of their product count, which do not swing as lengths of disturbances do.
     """
@@ -93,11 +81,11 @@ def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Expon
     if linear:
         half = len(maps) // 2
         one, other = (_growth(part) / (len(part) * span) for part in (maps[:half], maps[half:]))
-        return Exponent(0.5 * (one + other), 0.5 * abs(one - other))
+        return Rounded(0.5 * (one + other), 0.5 * abs(one - other))
     means = np.reshape(logs[TRANSIENT : TRANSIENT + batches * BATCH], (batches, BATCH)).mean(axis=1) / span
     longer = means[batches % 2 :].reshape(-1, 2).mean(axis=1)  # what wanders slowly is alike in neighbours
     off = max(float(each.std(ddof=1)) / math.sqrt(len(each)) for each in (means, longer))
-    return Exponent(float(means.mean()), CERTAIN * off)
+    return Rounded(float(means.mean()), CERTAIN * off)
 
 
 def _growth(maps: list[Floats]) -> float:
@@ -115,25 +103,12 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
         if found is None:
             return True
         theory = in_full_contact(found[0])
-        known = Exponent(theory.mode.growth, theory.known_to) if theory else None
-        measured = known if known and known.unstable is not None else exponent(*found, linear=known is not None)
-        return measured.unstable if measured else None
-
-    def edge(low: float, high: float) -> Edge:
-        below = unstable(low)
-        tolerance = critical.tolerance
-
-        def as_below(value: float) -> bool | None:
-            return None if (answer := unstable(value)) is None else answer is below
-
-        low, high = bisect(as_below, low, high, width=tolerance)
-        if high - low > tolerance:  # not known in the middle
-            middle = 0.5 * (low + high)
-            low = bisect(lambda value: unstable(value) is below, low, middle, width=tolerance, halvings=EDGES)[0]
-            high = bisect(lambda v: as_below(v) is not False, middle, high, width=tolerance, halvings=EDGES)[1]
-        return Edge(0.5 * (low + high), 0.5 * (high - low))
+        known = Rounded(theory.mode.growth, theory.known_to) if theory else None
+        measured = known if known and known.positive is not None else exponent(*found, linear=known is not None)
+        return measured.positive if measured else None
 
     values = np.linspace(critical.lower, critical.upper, VALUES).tolist()
     if all(steady_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
-    return joined(critical, [Piece(value, value, unstable(value)) for value in values], edge)
+    found = between_known(unstable, values, critical.tolerance, EDGES)
+    return of_changes(critical, unstable(values[0]) is True, found)

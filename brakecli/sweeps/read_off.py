@@ -8,12 +8,13 @@ import math
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
+from brakecli.analysis.margin import Change, between_known, joined
 from brakecli.analysis.stability.linear import Linear, linear_theory
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
 from brakecli.branches.explore import Explorer, crossing
 from brakecli.branches.line import Line
@@ -24,7 +25,7 @@ from brakecli.solver.links import natural_frequencies
 from brakecli.solver.schedules import schedule
 from brakecli.solver.system import System
 from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Edge, Piece, Search, joined
+from brakecli.sweeps.windows import Search, of_changes
 
 PART = 0.01
 """Bracket of a change by eigenvalues over the requested one, so that it adds nothing to that."""
@@ -37,6 +38,14 @@ SLOPE = 1e-3
 LIGHT = 1e-5
 """Damping ratio of the slowest mode that a shoe without dashpots is given: slower growth counts as none. Without
 any nothing decays, and passing waves let almost every motion grow a little, over minutes."""
+
+
+class Piece(NamedTuple):
+    """A part of the range, and whether it is unstable; None where nobody knows."""
+
+    low: float
+    high: float
+    unstable: bool | None
 
 
 def explored(critical: Critical, case: Case) -> Explorer:
@@ -58,13 +67,14 @@ def on_waves(critical: Critical, answers: Answers) -> Search:
         line.value(bound.p): (bound, high.p - low.p) for low, high in answers.windows for bound in (low, high)
     }
 
-    def edge(low: float, high: float) -> Edge:
+    def located(low: float, high: float, lost: bool) -> Change:
         if low != high or low not in bounds:
-            return Edge(0.5 * (low + high), 0.5 * (high - low))
+            return Change(0.5 * (low + high), 0.5 * (high - low), lost)
         bound, window = bounds[low]
-        return Edge(low, width * (bound.bar if bound.known else window), bound.known)
+        return Change(low, width * (bound.bar if bound.known else window), lost, known=bound.known)
 
-    return joined(critical, pieces(answers), edge)
+    sides = [(end, piece.unstable) for piece in pieces(answers) for end in (piece.low, piece.high)]
+    return of_changes(critical, sides[0][1] is True, joined(sides, line.high, located))
 
 
 def in_full_contact(system: System) -> Linear | None:
@@ -96,15 +106,16 @@ def without_dashpots(critical: Critical, answers: Answers) -> Search:
             return theory.mode.growth > theory.known_to
         return next((piece.unstable for piece in known if piece.low <= value <= piece.high), None)
 
-    def edge(low: float, high: float) -> Edge:
-        bounds = [bound for window in answers.windows for bound in window if low <= line.value(bound.p) <= high]
-        low, high = bisect(lambda v: unstable(v) is unstable(low), low, high, width=PART * critical.tolerance)
-        bars = [each.bar for each in bounds if low <= line.value(each.p) <= high]
-        return Edge(0.5 * (low + high), 0.5 * (high - low) + (line.high - line.low) * max(bars, default=0.0))
+    def widened(change: Change) -> Change:
+        near = change.error + math.ulp(change.value)
+        bounds = [bound for window in answers.windows for bound in window]
+        bars = [each.bar for each in bounds if change.known and abs(line.value(each.p) - change.value) <= near]
+        return change._replace(error=change.error + (line.high - line.low) * max(bars, default=0.0))
 
     middles = {0.5 * (piece.low + piece.high) for piece in known}
     values = sorted({*np.linspace(line.low, line.high, VALUES).tolist(), *middles})
-    return joined(critical, [Piece(value, value, unstable(value)) for value in values], edge)
+    found = between_known(unstable, values, PART * critical.tolerance)
+    return of_changes(critical, unstable(values[0]) is True, map(widened, found))
 
 
 def calm(answers: Answers, value: float) -> list[Array]:

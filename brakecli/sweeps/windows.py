@@ -1,11 +1,11 @@
 """Windows of instability along a parameter, and what a search for a critical value has come to."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Iterable
 from enum import StrEnum
-from itertools import pairwise
 from typing import NamedTuple
 
+from brakecli.analysis.margin import Change
 from brakecli.sweeps.tables import Critical
 
 WIDEST = 1.0 / 3.0
@@ -67,73 +67,22 @@ class Search(NamedTuple):
         return any(low <= value <= high for low, high in self.windows) if known else None
 
 
-class Edge(NamedTuple):
-    """Where stability is lost, or regained, with its error bar; or where it is not known any more."""
-
-    value: float
-    error: float
-    known: bool = True
-
-
-class Piece(NamedTuple):
-    """A part of the range, or a single value, and whether it is unstable; None where nobody knows."""
-
-    low: float
-    high: float
-    unstable: bool | None
-
-
-def joined(critical: Critical, pieces: list[Piece], edge: Callable[[float, float], Edge]) -> Search:
-    """The critical value and all windows of instability; `edge` says where between two values stability changes.
-
-    Stability may be lost where nothing is known: a window may then begin, or end, anywhere there.
-    """
-    decided = [k for k, piece in enumerate(pieces) if piece.unstable is not None]
-    if not decided:
-        return Search(Outcome.UNDECIDED)
-    first = pieces[decided[0]]
-    last = pieces[decided[-1]]
-    edges = list[Edge]()
-    begun = first.unstable and decided[0] == 0
-    if decided[0] > 0:
-        edges += [
-            _anywhere(critical.lower, first.low),
-            *[_anywhere(first.low, critical.lower)] * (not first.unstable),
-        ]
-    for one, other in pairwise(decided):
-        before = pieces[one]
-        after = pieces[other]
-        if before.unstable is not after.unstable:
-            edges.append(edge(before.high, after.low))
-        elif not before.unstable and other > one + 1:
-            edges += [_anywhere(before.high, after.low), _anywhere(after.low, before.high)]
-    if decided[-1] < len(pieces) - 1:
-        edges += (
-            [_anywhere(critical.upper, last.high)] if last.unstable else [_anywhere(last.high, critical.upper)]
-        )
-    return of_edges(critical, bool(begun), edges)
-
-
-def _anywhere(value: float, other: float) -> Edge:
-    """An end of what may be a window of instability: at a value, or anywhere on the way to another one."""
-    return Edge(value, abs(other - value), known=False)
-
-
-def of_edges(critical: Critical, unstable: bool, edges: list[Edge]) -> Search:
-    """The critical value and all windows, by the edges in order; `unstable`: whether the range begins in one."""
-    wide = WIDEST * (critical.upper - critical.lower)
-    ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in edges]
+def of_changes(critical: Critical, unstable: bool, found: Iterable[Change]) -> Search:
+    """The critical value and all windows, by the changes in order; `unstable`: whether the range begins in one."""
+    changes = [*found]
+    whole = critical.upper - critical.lower
+    ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in changes]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
     columns = ([each[k] for each in ends] for k in (0, 1))
     windows, errors = (tuple(zip(each[::2], each[1::2], strict=True)) for each in columns)
-    if not edges:
+    if not changes:
         return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
-    first = edges[min(unstable, len(edges) - 1)]  # where stability is lost; else where it is regained
+    first = changes[min(unstable, len(changes) - 1)]  # where stability is lost; else where it is regained
+    if first.error >= (WIDEST * whole if first.known else whole):  # almost any value of the range may be it
+        return Search(Outcome.UNDECIDED)
     if not first.known:
         return Search(Outcome.UNDECIDED, windows=windows, window_errors=errors)
-    if first.error >= wide:  # almost any value of the range may be it
-        return Search(Outcome.UNDECIDED)
-    outcome = Outcome.REGAINED if unstable and len(edges) == 1 else Outcome.FOUND
+    outcome = Outcome.REGAINED if unstable and len(changes) == 1 else Outcome.FOUND
     lower = max(first.value - first.error, critical.lower)
     upper = min(first.value + first.error, critical.upper)
     return Search(outcome, first.value, lower, upper, first.error, windows=windows, window_errors=errors)

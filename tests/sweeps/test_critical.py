@@ -308,9 +308,9 @@ def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undec
     measured = exponent(system, steady_sliding(system))
     rate = event_driven_growth(friction)
     assert measured is not None
-    assert measured.unstable in (rate > 0.0, None)
-    if measured.unstable is not None or rate < 0.0:
-        assert abs(measured.rate - rate) <= measured.error + 0.1
+    assert measured.positive in (rate > 0.0, None)
+    if measured.positive is not None or rate < 0.0:
+        assert abs(measured.value - rate) <= measured.error + 0.1
 
 
 @pytest.mark.usefixtures("without_runs")

@@ -52,6 +52,11 @@ class Rounded:
         """Whether it is surely below zero."""
         return self.value < -self.error
 
+    @property
+    def positive(self) -> bool | None:
+        """Whether it is above zero; None where zero lies within the error."""
+        return None if abs(self.value) <= self.error else self.value > 0.0
+
 
 class Links(NamedTuple):
     """What the conditions take of a case, rounded; b and c: xx, xy and yy, as in (6)-(7)."""
