@@ -106,7 +106,7 @@ def joined(
     """The changes along rising values up to the last, each with whether it is unstable; None where nobody knows.
 
     `located` finds the one between two known ones, at which stability is lost, or not. Stability may be lost where
-    nothing is known: a window may then begin, or end, anywhere there.
+    nothing is known: a window may then begin, or end, anywhere there. Where no side is known there is no change.
     """
     each = iter(sides)
     low, before = next(each)
@@ -117,7 +117,7 @@ def joined(
             continue
         if {before, after} == {False, True}:
             yield located(low, high, after is True)
-        elif hidden:
+        elif hidden and {before, after} != {None}:
             if not before:
                 yield Change(low, high - low, lost=True, known=False)
             if not after and (before, after) != (False, None):  # otherwise the bound cuts it

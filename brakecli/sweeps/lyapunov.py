@@ -49,9 +49,10 @@ def exponent_length(system: System) -> float:
 def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Rounded | None:
     """Lyapunov's exponent (1/s) of the motion from steady sliding, by means over batches of a long run.
 
-    It is hardly off by more than its error. A motion that leaves what roughness forces on it is on its way to another one, whose exponent says nothing:
-    that part is left out. None where too little is left. The maps of a `linear` motion hardly change: there the
-    eigenvalues of their product count, which do not swing as lengths of disturbances do.
+    It is hardly off by more than its error. A motion that leaves what roughness forces on it is on its way to
+    another one, whose exponent says nothing: that part is left out. None where too little is left. The maps of a
+    `linear` motion hardly change: there the eigenvalues of their product count, which do not swing as lengths of
+    disturbances do.
     """
     flow = RoughFlow(system, default_cells(system))
     span = length(system)
@@ -111,4 +112,4 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
     if all(steady_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
     found = between_known(unstable, values, critical.tolerance, EDGES)
-    return of_changes(critical, unstable(values[0]) is True, found)
+    return of_changes(critical, unstable(values[0]), found)

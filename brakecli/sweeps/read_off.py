@@ -74,7 +74,7 @@ def on_waves(critical: Critical, answers: Answers) -> Search:
         return Change(low, width * (bound.bar if bound.known else window), lost, known=bound.known)
 
     sides = [(end, piece.unstable) for piece in pieces(answers) for end in (piece.low, piece.high)]
-    return of_changes(critical, sides[0][1] is True, joined(sides, line.high, located))
+    return of_changes(critical, sides[0][1], joined(sides, line.high, located))
 
 
 def in_full_contact(system: System) -> Linear | None:
@@ -115,7 +115,7 @@ def without_dashpots(critical: Critical, answers: Answers) -> Search:
     middles = {0.5 * (piece.low + piece.high) for piece in known}
     values = sorted({*np.linspace(line.low, line.high, VALUES).tolist(), *middles})
     found = between_known(unstable, values, PART * critical.tolerance)
-    return of_changes(critical, unstable(values[0]) is True, map(widened, found))
+    return of_changes(critical, unstable(values[0]), map(widened, found))
 
 
 def calm(answers: Answers, value: float) -> list[Array]:

@@ -67,22 +67,23 @@ class Search(NamedTuple):
         return any(low <= value <= high for low, high in self.windows) if known else None
 
 
-def of_changes(critical: Critical, unstable: bool, found: Iterable[Change]) -> Search:
-    """The critical value and all windows, by the changes in order; `unstable`: whether the range begins in one."""
+def of_changes(critical: Critical, unstable: bool | None, found: Iterable[Change]) -> Search:
+    """The critical value and all windows, by the changes in order; `unstable`: the side of the first value."""
     changes = [*found]
-    whole = critical.upper - critical.lower
-    ends = [(critical.lower, 0.0)] * unstable + [(each.value, each.error) for each in changes]
+    begun = unstable is True
+    ends = [(critical.lower, 0.0)] * begun + [(each.value, each.error) for each in changes]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
     columns = ([each[k] for each in ends] for k in (0, 1))
     windows, errors = (tuple(zip(each[::2], each[1::2], strict=True)) for each in columns)
     if not changes:
-        return Search(Outcome.UNSTABLE if unstable else Outcome.STABLE, windows=windows, window_errors=errors)
-    first = changes[min(unstable, len(changes) - 1)]  # where stability is lost; else where it is regained
-    if first.error >= (WIDEST * whole if first.known else whole):  # almost any value of the range may be it
-        return Search(Outcome.UNDECIDED)
+        outcome = {True: Outcome.UNSTABLE, False: Outcome.STABLE, None: Outcome.UNDECIDED}[unstable]
+        return Search(outcome, windows=windows, window_errors=errors)
+    first = changes[min(begun, len(changes) - 1)]  # where stability is lost; else where it is regained
     if not first.known:
         return Search(Outcome.UNDECIDED, windows=windows, window_errors=errors)
-    outcome = Outcome.REGAINED if unstable and len(changes) == 1 else Outcome.FOUND
+    if first.error >= WIDEST * (critical.upper - critical.lower):  # almost any value of the range may be it
+        return Search(Outcome.UNDECIDED)
+    outcome = Outcome.REGAINED if begun and len(changes) == 1 else Outcome.FOUND
     lower = max(first.value - first.error, critical.lower)
     upper = min(first.value + first.error, critical.upper)
     return Search(outcome, first.value, lower, upper, first.error, windows=windows, window_errors=errors)

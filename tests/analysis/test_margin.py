@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from brakecli.analysis.margin import Change, Margin, changes, left_open
+from brakecli.analysis.margin import Change, Margin, between, between_known, changes, joined, left_open
 from brakecli.analysis.stability.certain import Rounded
 
 VALUES = np.linspace(0.0, 1.0, 17).tolist()
@@ -65,6 +65,84 @@ def test_a_value_at_which_rounding_hides_the_side_ends_no_bracket(sign: float) -
     assert abs(found.value - root) <= found.error <= 2e-5
     stable = found.value - sign * found.error
     assert sign * (root - stable) > 1e-6
+
+
+@pytest.mark.parametrize("lost", [True, False])
+def test_a_bracket_goes_from_the_last_known_value_to_the_first_one_after_it(lost: bool) -> None:
+    """Within 0.01 of 0.35 the side is not known. 2⁻⁴ takes 16 halvings to come below 1e-6.
+
+    From 0 and 1 the fifth value, 0.34375, is not known; 2⁻⁵ to either side of it is then halved four times.
+    """
+    asked = list[float]()
+
+    def unstable(x: float) -> bool | None:
+        asked.append(x)
+        return None if abs(x - 0.35) <= 0.01 else (x > 0.35) is lost
+
+    (found,) = between_known(unstable, VALUES, 1e-6)
+    low = found.value - found.error
+    high = found.value + found.error
+    assert 0.34 - 1e-6 <= low < 0.34
+    assert 0.36 < high <= 0.36 + 1e-6
+    assert (found.lost, found.which, found.known) == (lost, None, True)
+    assert len(asked) <= len(VALUES) + 2 * 16
+    asked.clear()
+    (found,) = between_known(unstable, [0.0, 1.0], 1e-6, 4)
+    assert 0.34 - 2.0**-9 <= found.value - found.error < 0.34
+    assert 0.36 < found.value + found.error <= 0.36 + 2.0**-9
+    assert len(asked) == 2 + 5 + 2 * 4
+
+
+def test_where_all_sides_are_known_each_halving_asks_once() -> None:
+    """A width of 2⁻¹⁰ of the distance takes ten."""
+    asked = list[float]()
+
+    def unstable(x: float) -> bool:
+        asked.append(x)
+        return x > 1 / 3
+
+    (found,) = between_known(unstable, [0.0, 1.0], 2.0**-10)
+    assert abs(found.value - 1 / 3) <= found.error == 2.0**-11
+    assert len(asked) == 2 + 10
+
+
+@pytest.mark.parametrize(
+    ("sides", "expected"),
+    [
+        ("FFTTF", [(1.5, 0.5, True, True), (3.5, 0.5, False, True)]),
+        ("F??T", [(1.5, 1.5, True, True)]),
+        ("F?FT", [(0.0, 2.0, True, False), (2.0, 2.0, False, False), (2.5, 0.5, True, True)]),
+        ("T??T", []),
+        ("??T", [(0.0, 2.0, True, False)]),
+        ("?FF", [(0.0, 1.0, True, False), (1.0, 1.0, False, False)]),
+        ("T??", [(2.0, 2.0, False, False)]),
+        ("FF?", [(1.0, 1.0, True, False)]),
+        ("???", []),
+        ("F", []),
+    ],
+)
+def test_a_window_may_begin_or_end_anywhere_where_nothing_is_known(
+    sides: str, expected: list[tuple[float, float, bool, bool]]
+) -> None:
+    """Of sides at 0, 1, 2, …: F stable, T unstable, ? not known. The upper bound cuts a window that reaches it."""
+    known = [(float(k), {"F": False, "T": True}.get(side)) for k, side in enumerate(sides)]
+
+    def halfway(low: float, high: float, lost: bool) -> Change:
+        return Change(0.5 * (low + high), 0.5 * (high - low), lost)
+
+    found = list(joined(known, known[-1][0], halfway))
+    assert [(each.value, each.error, each.lost, each.known) for each in found] == expected
+
+
+def test_beyond_the_change_that_is_taken_nothing_is_asked() -> None:
+    asked = list[float]()
+
+    def ends(x: float) -> list[Rounded] | None:
+        asked.append(x)
+        return [Rounded(1.0)] if x < 0.35 else None
+
+    next(between(ends, VALUES))
+    assert max(asked) == min(value for value in VALUES if value >= 0.35)
 
 
 def test_where_sliding_ends_nothing_passes_zero() -> None:
