@@ -5,10 +5,10 @@ from functools import cache
 from typing import NamedTuple
 
 from brakecli.analysis.fate import Fate, Kind, fate
+from brakecli.analysis.margin import between_known
 from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.stability.linear import linear_theory
 from brakecli.analysis.stability.modes import is_undamped
-from brakecli.analysis.stability.search import bisect
 from brakecli.branches.answers import Answers
 from brakecli.branches.problem import Array
 from brakecli.case.case import Case, changed
@@ -87,10 +87,9 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
     if low == just_below:  # vibration begins where stability is lost
         return ended(found.value, Outcome.FOUND)
     # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
-    fading, _ = bisect(lambda value: lasts(value) is False, low, high, width=tolerance)
-    _, lasting = bisect(lambda value: not lasts(value), fading, high, width=tolerance)
-    known = lasting - fading <= 2.0 * tolerance
-    return ended(0.5 * (fading + lasting), Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
+    [begun] = between_known(lasts, [low, high], tolerance)
+    known = begun.error <= tolerance
+    return ended(begun.value, Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
 
 
 def _end(answers: Answers, value: float) -> Fate:

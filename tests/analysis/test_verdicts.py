@@ -16,6 +16,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.runs.judge import given
 from brakecli.solver.history import array_history
+from brakecli.solver.quantities import ContactState
 from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
 from tests.campaign import counts
@@ -311,3 +312,33 @@ def test_the_torque_of_a_pad_that_opens_waits_for_the_force() -> None:
     verdict = verdict_of(parse_case(tomli_w.dumps(SHOES["force that rings longer than x"]), "case").case)
     assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
     assert verdict.torque_variation == pytest.approx(377.24, rel=verdict.thresholds.settled_within)
+
+
+@pytest.mark.parametrize("omega", [0.1, 2.0])
+def test_a_settled_vibration_has_the_numbers_of_its_limit_cycle(omega: float) -> None:
+    """By stick, and by loss of contact. At a given step it keeps those of its samples, within their spread.
+
+    The samples of the motion itself, 574 a cycle, miss (π/574)²/2 of an amplitude and a sample of a stick.
+    """
+    changes: dict[str, Any] = {
+        "friction__coefficient": 0.7,
+        "wheel__angular_speed": omega,
+        "solver__duration": 2.0,
+    }
+    exact: dict[str, Any] = {"solver__scheme": "piecewise-exact", "solver__step": None, "solver__tolerance": 1e-3}
+    fine = make(SQUEAL, **changes, **exact, output__sample_interval=1e-5)
+    coarse = verdict_of(make(SQUEAL, **changes, **exact, output__sample_interval=5e-4))
+    verdict = verdict_of(fine)
+    assert (verdict.settled, coarse.settled) == (True, True)
+    late = simulate(fine).rows[-100_000:]
+    assert coarse.amplitude == pytest.approx(verdict.amplitude, rel=1e-10)  # both have closed it to 1e-11
+    assert verdict.amplitude == pytest.approx(0.5 * float(np.ptp(late[:, 0])), rel=2e-5)
+    assert verdict.frequency is not None
+    sample = 1e-5 * verdict.frequency
+    assert verdict.stick_fraction == pytest.approx(float(np.mean(late[:, 7] == ContactState.STICK)), abs=sample)
+    assert verdict.mean_friction_force == pytest.approx(float(late[:, 4].mean()), rel=1e-3)
+    assert verdict.amplitude_spread == pytest.approx(1e-11 * verdict.amplitude)
+    stepped = verdict_of(make(SQUEAL, **changes))
+    assert stepped.amplitude_spread is not None
+    assert abs(stepped.amplitude - verdict.amplitude) <= stepped.amplitude_spread
+    assert stepped.amplitude_spread > 1e-6 * verdict.amplitude
