@@ -40,6 +40,7 @@ _POWERS = 10.0  # of e, by which what is left then fades until the end: drift is
 _SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
 _CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where they cut the cycles
 _SAMPLES = 40.0  # in a cycle, so that its shape is seen
+_GRAZES = 0.01  # of the wheel's speed: nearer to it, rounding may decide whether the shoe sticks
 _SEEN = 1.2  # samples beside steady sliding: one falls into each time, also where the orbit is not reached yet
 
 
@@ -179,6 +180,7 @@ def _cycle(
         or duration < _CYCLES * WINDOWS * orbit.period
         or orbit.period < _SAMPLES * interval
         or _longest_away(orbit, int(way.sliding)) < _SEEN * interval
+        or (orbit.stick_fraction == 0.0 and abs(motion.fastest - 1.0) < _GRAZES)
         or motion.path.beaten.tolist() != [1, 1]  # more than one fall of vx that counts
     )
     if (

@@ -16,6 +16,7 @@ from brakecli.case.system import system_of
 from brakecli.runs import judge
 from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import HISTORY, ContactState
+from brakecli.sweeps.early import early
 from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of
 from tests.analysis.shoes import Shoe, random_shoes
@@ -606,3 +607,46 @@ def test_what_may_come_together_has_no_phase_of_its_own(times: float) -> None:
     verdict = judged_to_its_tolerance("comes together more slowly than is sure", times)
     assert verdict.excitation is (Excitation.NONE if times == 1.0 else Excitation.FORCED)
     assert times > 1.0 or "run at least" in verdict.reasons[0]
+
+
+def test_what_has_a_phase_of_its_own_is_not_forced_whatever_takes_its_energy() -> None:
+    """By another integrator it vibrates at 230.364 Hz, as on the smooth wheel; the waves pass at up to 104 Hz."""
+    verdict = judged_to_its_tolerance("waves shake what is self-excited")
+    assert verdict.excitation is not Excitation.FORCED
+
+
+def test_a_forced_motion_whose_exponent_may_be_zero_has_not_settled() -> None:
+    """By another integrator the amplitude falls from 35 to 5 micrometres in 40 times the run."""
+    verdict = judged_to_its_tolerance("own vibration dies slowly beside waves")
+    assert verdict.excitation is Excitation.FORCED
+    assert verdict.settled is False
+    assert "dies away" in verdict.reasons[1]
+
+
+def test_an_orbit_is_gone_round_once() -> None:
+    """By another integrator 457.3467 Hz and -64.6446 N; its third return lies nearer to it than its first one."""
+    verdict = judged_to_its_tolerance("three times round its orbit")
+    assert verdict.settled
+    assert verdict.frequency == pytest.approx(457.3467, abs=5e-5)  # the last digit that is given
+    assert verdict.mean_friction_force == pytest.approx(-64.6446, abs=5e-5)
+    assert "457.3 Hz" in verdict.reasons[0]
+
+
+def test_the_spread_of_a_stick_holds_how_far_steps_are_from_the_limit_cycle() -> None:
+    """By another integrator it sticks in 0.0158 of the time."""
+    verdict = judged("steps hide the stick of its cycle")
+    assert abs(verdict.stick_fraction - 0.0158) <= verdict.evidence["stick_spread"] + 5e-5
+
+
+def test_a_cycle_of_eight_samples_is_known_by_its_turning_points() -> None:
+    """By another integrator it is on its limit cycle, of 5.517e-7 m."""
+    verdict = judged_to_its_tolerance("eight samples miss the peaks of its cycle")
+    assert verdict.settled
+    assert verdict.amplitude == pytest.approx(5.517e-7, rel=1e-3)
+
+
+def test_where_rounding_decides_on_stick_no_verdict_is_early() -> None:
+    """By another integrator it sticks in each cycle, for 2.5e-8 of the time."""
+    name = "grazes stick within rounding"
+    assert early(system_of(make(SHOES[name]))) is None
+    assert judged_to_its_tolerance(name).regime is Regime.RELAXATION

@@ -108,16 +108,19 @@ def _forced(shown: Shown, answers: Answers) -> Lasting:
     history = shown.history
     rate = -answers.lyapunov_exponent if math.isfinite(answers.lyapunov_exponent) else -shown.context.growth()
     fading = 0.25 * shown.duration * rate < RELAXED  # too slowly to be seen within a quarter of the run
-    chaos = math.isfinite(answers.lyapunov_exponent) and answers.lyapunov_exponent > 0.0
+    chaos = answers.lyapunov_exponent > shown.limits.sure_errors * answers.lyapunov_error
     found = Lasting(part, answers.settled, 0.0)
     if not found.settled and not fading:
         found.settled = shown.changes() <= shown.limits.settled_within
     seconds = (part.stop - part.start) * interval
     if not chaos and (not found.settled or seconds * rate < RELAXED):
         found.settled = False
-        needed = shown_after(shown.duration, rate)
-        text = f"what the shoe adds dies away at only {rate:.3g} 1/s"
-        found.notes["settled"] = f"{text}: run at least {needed:.3g} s to see the amplitude that lasts"
+        text = "it is not certain that what the shoe adds dies away: run longer"
+        if rate > 0.0:
+            needed = shown_after(shown.duration, rate)
+            text = f"what the shoe adds dies away at only {rate:.3g} 1/s: run at least {needed:.3g} s"
+            text += " to see the amplitude that lasts"
+        found.notes["settled"] = text
     elif found.settled and seconds < (beat := shown.beat()):
         found.settled = False
         found.notes["beat"] = f"the waves beat every {beat:.3g} s: run longer"
@@ -177,22 +180,25 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     found = Lasting(part, lasts, cycles.amplitude, cycles=cycles)
     found.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
     changed = max(_surely(cycles.drift, shown.limits), _surely(cycles.detuning, shown.limits))
-    off = abs(answers.amplitude - answers.amplitude_without_waves)
+    off = abs(cycles.amplitude - answers.amplitude_without_waves)
     turns = answers.period_without_waves * cycles.frequency
     whole = round(turns) if math.isfinite(turns) else 0
     detuned = abs(turns - whole) / turns
-    apart = max(off / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / _DRIFT)
+    nearest = min(off, abs(answers.amplitude - answers.amplitude_without_waves))  # cycles may be parts of it
+    apart = max(nearest / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / _DRIFT)
     far = not apart <= 1.0  # also where it is not known
     if lasts and not (answers.waves or shown.context.step or far) and whole == 1:
         return _on_orbit(found, shown.fate.orbit)
     longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if not lasts:
-        text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
+        text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}"
+        if not answers.settled:
+            text = f"its level has not settled: {longer if rate > 0.0 else 'run longer'}"
     elif not answers.waves and far:
         text = f"continued, this vibration comes to {answers.limit}: {longer}"
         if shown.context.step and apart < math.inf:
-            finer = shown.context.step * math.sqrt(_AIM / apart)  # errors of impacts grow with its square
+            finer = shown.context.step * _AIM / apart  # large shifts grow less than with its square
             text += f"; if it stays as it is, its steps shift it: take a solver.step of {finer:.2g} s, or a"
             text += " solver.tolerance"
     elif changed > _DRIFT:
@@ -213,19 +219,23 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
 
     wander = cycles.evidence["frequency_spread"]
     spread = held(wander, cycles.frequency, cycles.detuning)
-    more = cycles.frequency_off
-    if far and not answers.waves and math.isfinite(detuned):
-        more += detuned * cycles.frequency
-    found.evidence["frequency_spread"] = min((wander if spread is None else spread) + more, cycles.frequency)
+    wander = (wander if spread is None else spread) + cycles.frequency_off
     found.frequency = cycles.frequency
     if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
-        found.frequency, width = part.strongest
-        found.evidence |= {"frequency_spread": width, **in_lines(part, found.frequency)}
+        found.frequency, wander = part.strongest
+        found.evidence |= in_lines(part, found.frequency)
     short = seconds < shown.slowest(0.0) or abs(answers.level_change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends
         found.spread = held(cycles.amplitude_spread, cycles.amplitude, cycles.drift)
-        if far and not answers.waves and found.spread is not None and math.isfinite(off):
+    orbit = shown.fate.orbit if not answers.waves and math.isfinite(turns) else None
+    if orbit is not None:  # how far the run is from it
+        turns = orbit.period * found.frequency
+        wander += abs(turns - round(turns)) / orbit.period
+        if found.spread is not None and (far or whole == 1):
             found.spread += off
+        found.evidence["stick_spread"] += abs(cycles.stick_fraction - orbit.stick_fraction)
+        found.evidence["contact_loss_spread"] += abs(cycles.contact_loss_fraction - orbit.contact_loss_fraction)
+    found.evidence["frequency_spread"] = min(wander, found.frequency)
     return found
 
 
@@ -239,8 +249,9 @@ def _on_orbit(found: Lasting, orbit: Orbit | None) -> Lasting:
         found.frequency = orbit.frequency
         found.spread = orbit.error * orbit.amplitude
         found.evidence["frequency_spread"] = orbit.error * orbit.frequency
-        found.evidence["stick_spread"] = orbit.error * orbit.stick_fraction
-        found.evidence["contact_loss_spread"] = orbit.error * orbit.contact_loss_fraction
+        graze = math.sqrt(orbit.error)  # part of a period in a phase that only just comes about
+        found.evidence["stick_spread"] = graze
+        found.evidence["contact_loss_spread"] = graze
     return found
 
 

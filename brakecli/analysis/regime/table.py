@@ -287,6 +287,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             takes(motion, limits)
             and roughness_gives_most(motion, limits)
             and (steady(motion, limits) or motion.without_waves == Continuation.DIES)
+            and not (motion.without_waves == Continuation.LASTS and apart(motion, limits))
             and not motion.undamped
         ),
         "only the roughness shakes the shoe: it gives {power_of_roughness:.2g} W, and friction takes "

@@ -10,7 +10,7 @@ from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.motion.orbit import CLOSED
 from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
-from brakecli.solver.motion.record import BELT, LOAD, MATRICES
+from brakecli.solver.motion.record import BELT, LOAD, MATRICES, MOST_TURNS, V_X
 from brakecli.solver.motion.tasks import FLY, SEEK, SWING, advance
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
@@ -18,6 +18,9 @@ from brakecli.solver.system import System, longest_step
 
 FOREVER = 1e300
 """A time (s) that no motion reaches: finite, as a mode that decays does not grow in it at all."""
+
+SAME = 1e-7
+"""Part of a period by which times in it may differ from one round of an orbit to the next."""
 
 Modes = tuple[NDArray[np.complex128], NDArray[np.complex128]]
 """Eigenvalues of steady sliding (1/s), and the vectors of position and velocity in columns."""
@@ -113,6 +116,17 @@ class SmoothFlow:
         return tuple(self.path.times[: self.path.events].tolist())
 
 
+def _rounds(word: list[int], times: list[float], period: float) -> int:
+    """How often a motion has gone round its orbit in a time (s): phases, and when they change, repeat as often."""
+    for rounds in range(MOST_TURNS, 1, -1):
+        events, rest = divmod(len(times), rounds)
+        if rest == 0 and events > 0 and word[events:] == word[: len(word) - events]:
+            away = np.subtract(times[events:], times[:-events]) - period / rounds
+            if np.abs(away).max() <= SAME * period:
+                return rounds
+    return 1
+
+
 class Pursuit:
     """A motion on smooth pads, at constant speed and load, which is followed to what becomes of it.
 
@@ -187,18 +201,28 @@ class Pursuit:
         x, y, v_y = o.point.tolist()
         period = float(o.period)
         spent = (path.spent / period).tolist()
+        word = path.word[: path.events + 1].tolist()
+        times = path.times[: path.events].tolist()
+        rounds = _rounds(word, times, period)
+        events = len(times) // rounds
         return Orbit(
-            period=period,
+            period=period / rounds,
             amplitude=float(o.amplitude),
             stick_fraction=spent[STICK],
             contact_loss_fraction=spent[OPEN],
             state=(x, y, 0.0, v_y),
-            word=tuple(path.word[: path.events + 1].tolist()),
-            times=tuple(path.times[: path.events].tolist()),
+            word=tuple(word[: events + 1]),
+            times=tuple(times[:events]),
             level=float(path.band),  # the root of the mean square: the mean of vx over a period is 0
             mean_force=float(o.force),
             error=CLOSED,
         )
+
+    @property
+    def fastest(self) -> float:
+        """Largest v_x on the orbit over the wheel's speed."""
+        path = self.path
+        return float(max(path.low[V_X] / path.z[BELT], path.high[V_X] / path.z[BELT]))
 
     @property
     def multiplier(self) -> float:
