@@ -29,7 +29,7 @@ def command(
         cost = estimate(sweep.plan, crew(sweep.plan), spare=True)
         numbers = {"valid": True, **vars(cost)}
         show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
-        warn(*cost.refused)
+        warn(*cost.refused, *cost.implausible)
         refuse_sweep(cost, free_bytes(Path()))
         return
     loaded = load_case(file, overrides)

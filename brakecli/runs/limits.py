@@ -21,6 +21,7 @@ from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
 from brakecli.runs.cost import beside_seconds, duration_text, guessed, held_bytes, stability_seconds
+from brakecli.runs.plausible import implausible
 from brakecli.runs.price import measured
 from brakecli.runs.settled import longest
 from brakecli.solver.contact import EVALUATORS
@@ -206,6 +207,7 @@ def _warnings(found: Check) -> Iterator[str]:
         yield f"contact.half_length: {longer}; check their units"
     if values(system.load).min() < 0.0:
         yield "load: the force is negative at times, it lifts the shoe off the wheel"
+    yield from implausible(system)  # last: the first one is all that a sweep tells of a point
 
 
 def _unresolved(system: System, per_period: float) -> Iterator[tuple[str, float, str]]:

@@ -11,6 +11,7 @@ from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.faces import argument
 from brakecli.runs.cost import duration_text
 from brakecli.runs.limits import FILE_BYTES, MOST_BYTES, check, refuse, within_range
+from brakecli.runs.plausible import implausible
 from brakecli.solver.period import common_period
 from brakecli.sweeps.early import may_be_early
 from brakecli.sweeps.pilot import UNEVEN, WORKER_SECONDS, Pilot
@@ -51,6 +52,7 @@ class Estimate:
     at_least: bool = False  # points that were not computed, or their searches, may well take longer
     together: int = 1  # points that a task should hold, as they are computed side by side
     refused: tuple[str, ...] = ()  # points that were looked at and will fail, each with its reason
+    implausible: tuple[str, ...] = ()  # warnings of those points that a number is out of the range of brakes
 
     def sentence(self) -> str:
         """The estimate in words."""
@@ -76,11 +78,13 @@ def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
     dearest = 0.0
     early = True
     failing = list[str]()
+    strange = dict[str, None]()  # each said once
     critical = plan.sweep.critical
     by_simulation = critical is not None and critical.method == "simulation"
     for point in sorted({0, plan.points - 1}):
         with _noted(plan, point, failing), within_range():
             system = system_of(plan.case(plan.settings(point)))
+            strange |= dict.fromkeys(implausible(system))
             refuse(found := check(system))
             dearest = max(dearest, found.seconds)
             samples = max(samples, system.samples)
@@ -110,6 +114,7 @@ def estimate(plan: Plan, workers: int, *, spare: bool = False) -> Estimate:
         at_least=at_least,
         together=pilot.together,
         refused=tuple(failing),
+        implausible=tuple(strange),
     )
 
 
