@@ -148,7 +148,7 @@ def test_a_case_in_grams_is_told_so_and_a_sweep_of_it_once(compiled: None, tmp_p
         'case = "grams.toml"\n[[axis]]\nparameter = "friction.coefficient"\nvalues = [0.3, 0.4, 0.5]\n'
     )
     case = brakecli("check", "grams.toml", "--json", cwd=tmp_path)
-    assert case.told(0).splitlines() == [f"warning: {text}"]
+    assert case.told(0).splitlines() == [f"brakecli: warning: {text}"]
     assert case.json["warnings"] == [text]
     run = brakecli("run", "grams.toml", "--json", cwd=tmp_path)
     assert text in run.json["warnings"]
