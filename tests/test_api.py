@@ -335,6 +335,8 @@ def test_a_copy_that_xarray_has_saved_opens_and_is_said_to_be_unchecked(tmp_path
 def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     with (
+        pytest.warns(UserWarning, match=r"load\.force: 1e\+25 N is more than 1e\+06 N"),
+        pytest.warns(UserWarning, match=r"contact\.stiffness: a pad pressed in by .* half lengths is more than"),
         pytest.warns(UserWarning, match="not resolved"),
         pytest.raises(BrakecliError, match="grew beyond all bounds"),
     ):
@@ -344,7 +346,10 @@ def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
 
 def test_warnings_are_those_of_the_command(tmp_path: Path) -> None:
     steep = {**SHORT, "friction.coefficient": 1e9}
-    with pytest.warns(UserWarning, match="stick and slip are not resolved"):
+    with (
+        pytest.warns(UserWarning, match=r"friction\.coefficient: 1e\+09 is more than 2;"),
+        pytest.warns(UserWarning, match="stick and slip are not resolved"),
+    ):
         brakecli.run(CASE, steep)
 
 

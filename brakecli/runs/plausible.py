@@ -53,12 +53,13 @@ _SPRINGS = "were N/mm and N/mm² meant? Stiffnesses are in N/m, that of the cont
 _LINKS = "were N/mm meant? Stiffnesses are in N/m, dampings in N·s/m"
 _NEWTONS = "were kilonewtons meant? Forces are in N"
 _PASCALS = "was a pressure in Pa meant? Forces are in N"
+_PER_CENT = "were per cent meant? It is a ratio"
 _TURNS = "were revolutions per minute meant? Angular speeds are in rad/s"
 _SHARE = " times the links' stiffness"
 RANGES = (
     Range("shoe.mass", "", lambda s: s.coefficients.m, "more", 300.0, " kg", "were grams meant? Masses are in kg"),
     Range("wheel.radius", "", lambda s: s.radius, "more", 20.0, " m", "were millimetres meant? Lengths are in m"),
-    Range("friction.coefficient", "", lambda s: s.coefficients.phi, "more", 2.0, "", "were per cent meant?"),
+    Range("friction.coefficient", "", lambda s: s.coefficients.phi, "more", 2.0, "", _PER_CENT),
     Range("load.force", "", lambda s: _load(s) or math.inf, "less", 20.0, " N", _NEWTONS),  # no load is meant so
     Range("load.force", "", _load, "more", 1e6, " N", _PASCALS),
     Range("wheel.angular_speed", "a surface speed of ", lambda s: s.fastest_belt, "more", 100.0, " m/s", _TURNS),
