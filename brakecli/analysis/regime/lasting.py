@@ -194,7 +194,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     if not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}"
         if not answers.settled:
-            text = f"its level has not settled: {longer if rate > 0.0 else 'run longer'}"
+            text = f"its level still changes: {longer if rate > 0.0 else 'run longer'}"
     elif not answers.waves and far:
         text = f"continued, this vibration comes to {answers.limit}: {longer}"
         if shown.context.step and apart < math.inf:
