@@ -192,9 +192,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if not lasts:
-        text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}"
-        if not answers.settled:
-            text = f"its level still changes: {longer if rate > 0.0 else 'run longer'}"
+        text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
     elif not answers.waves and far:
         text = f"continued, this vibration comes to {answers.limit}: {longer}"
         if shown.context.step and apart < math.inf:

@@ -1,0 +1,189 @@
+"""A starter for a brake of one's own: a similar shoe with its mass, frequency, load and speed.
+
+Shoes are similar where all that has no unit agrees. In units of the mass m, of 1/ω with the angular frequency ω of
+the mode that vibrates, and of the load Q, a length is Q/(m ω²), a stiffness m ω² and a damping m ω. Equations
+(1)-(7) of similar shoes then differ by U m ω/Q alone. Waves as long as U/ω pass as often in a period.
+"""
+
+import math
+import re
+from functools import partial
+from typing import NamedTuple
+
+from brakecli.analysis.stability.modes import eigensystem
+from brakecli.case.read import parse_case
+from brakecli.case.system import system_of
+from brakecli.errors import UsageError
+from brakecli.solver.steady_sliding import sliding
+from brakecli.solver.system import System
+
+STICKS_BELOW = 0.396
+"""U m ω/Q below which the shoe of the starter `case` sticks in every cycle, by bisection of runs.
+
+Above, it leaves the wheel and never sticks.
+"""
+
+
+class Scales(NamedTuple):
+    """Factors of mass, time, length and wavelength, or the powers in which a number goes with them."""
+
+    mass: float = 0.0
+    time: float = 0.0
+    length: float = 0.0
+    wavelength: float = 0.0
+
+
+_POWERS = {
+    "mass": Scales(mass=1.0),
+    "radius": Scales(length=1.0),
+    "angular_speed": Scales(time=-1.0, length=-1.0, wavelength=1.0),  # U/R, where a wavelength is U times a time
+    "stiffness": Scales(mass=1.0, time=-2.0),
+    "damping": Scales(mass=1.0, time=-1.0),
+    "force": Scales(mass=1.0, time=-2.0, length=1.0),
+    "forces": Scales(mass=1.0, time=-2.0, length=1.0),
+    "half_length": Scales(length=1.0),
+    "contact.stiffness": Scales(mass=1.0, time=-2.0, length=-1.0),
+    "amplitudes": Scales(length=1.0),
+    "rms": Scales(length=1.0),
+    "wavelengths": Scales(wavelength=1.0),
+    "shortest": Scales(wavelength=1.0),
+    "longest": Scales(wavelength=1.0),
+    "wavenumbers": Scales(wavelength=-1.0),
+    "x": Scales(length=1.0),
+    "y": Scales(length=1.0),
+    "vx": Scales(time=-1.0, length=1.0),
+    "vy": Scales(time=-1.0, length=1.0),
+    "duration": Scales(time=1.0),
+    "step": Scales(time=1.0),
+    "sample_interval": Scales(time=1.0),
+}
+_IN_COMMENTS = {"m/s": Scales(time=-1.0, wavelength=1.0), "Hz": Scales(time=-1.0)}
+_HEADER = re.compile(r"(?:# )?\[([\w.]+)\]")
+_KEY = re.compile(r"((?:# )?)(\w+)( = )([^#\n]*?)( *)(#.*)?")
+_NUMBER = re.compile(r"[-+]?\b\d+(?:\.\d*)?(?:e[-+]?\d+)?")
+_SCHEDULES = re.compile(r"^(?:angular_speeds|forces) =", re.MULTILINE)
+_DIGITS = 6
+
+
+class Brake(NamedTuple):
+    """What is known of a brake, in SI units; None where the starter's holds."""
+
+    mass: float | None = None
+    frequency: float | None = None  # Hz, of the mode that vibrates
+    load: float | None = None
+    speed: float | None = None  # of the wheel's surface
+
+
+class _Known(NamedTuple):
+    """The same, all of it."""
+
+    mass: float
+    frequency: float
+    load: float
+    speed: float
+
+
+class Similar(NamedTuple):
+    """A case for a brake, and U m ω/Q of its shoe and of that of the starter."""
+
+    text: str
+    number: float
+    before: float
+    sticks: bool | None  # in every cycle, or never; None where only a run tells
+
+    @property
+    def sentence(self) -> str:
+        """What is assumed, and what follows."""
+        kept = "friction, angles, and the ratios of all stiffnesses, dampings and lengths are those of the starter"
+        number = f"U m ω/Q is {self.number:.3g} (there {self.before:.3g})"
+        regime = "quasi-harmonic: it leaves the wheel and does not stick"
+        if self.sticks:
+            regime = "relaxation: it sticks in every cycle"
+        follows = f", so that it vibrates, {regime}" if self.sticks is not None else "; a run tells what follows"
+        return f"{kept}; {number}{follows}"
+
+
+def similar(starter: str, text: str, brake: Brake) -> Similar:
+    """The text of a starter for a brake; raises UsageError for one with schedules, and for numbers not above 0."""
+    for name, value in brake._asdict().items():
+        if value is not None and not 0.0 < value < math.inf:
+            raise UsageError(f"--{name}: has to be above 0 (found {value:g}); give it in SI units")
+    if _SCHEDULES.search(text):
+        raise UsageError(
+            f"{starter} has speeds at given times; give a starter whose wheel turns evenly, such as case"
+        )
+    system = system_of(parse_case(text, starter).case)
+    frequency = _frequency(system)
+    given = _Known(system.coefficients.m, frequency, system.load_at_start, abs(system.belt_speed))
+    mass = (brake.mass or given.mass) / given.mass
+    time = frequency / (brake.frequency or frequency)
+    load = (brake.load or given.load) / given.load
+    length = load * time**2 / mass
+    speed = brake.speed / given.speed if brake.speed else length / time
+    factors = Scales(mass, time, length, speed * time)
+    wanted = _Known(given.mass * mass, frequency / time, given.load * load, given.speed * speed)
+    number = _number(wanted)
+    sticks = number < STICKS_BELOW if starter == "case" else None
+    return Similar(_scaled(text, factors, _head(wanted, starter)), number, _number(given), sticks)
+
+
+def _number(brake: _Known) -> float:
+    return 2.0 * math.pi * brake.frequency * brake.speed * brake.mass / brake.load
+
+
+def _frequency(system: System) -> float:
+    """Frequency (Hz) of the mode that grows fastest, or decays slowest, beside steady sliding."""
+    c = system.coefficients
+    rest = sliding(system)
+    stiffness = rest.stiffness if rest else system.contact_stiffness
+    values, _ = eigensystem(c, stiffness, c.grip(system.belt_speed))
+    return abs(float(values[values.real.argmax()].imag)) / (2.0 * math.pi)
+
+
+def _head(brake: _Known, starter: str) -> str:
+    """The first lines of the case, and its title."""
+    of_brake = f"A brake of {brake.mass:g} kg at {brake.frequency:.4g} Hz, under {brake.load:g} N"
+    return f"{of_brake}, at {brake.speed:.4g} m/s: similar to the starter {starter}"
+
+
+def _scaled(text: str, factors: Scales, title: str) -> str:
+    """A case with all its numbers that have a unit scaled, also those in comments that are keys, speeds or Hz."""
+    table = ""
+    lines = []
+    for line in text.splitlines():
+        if header := _HEADER.match(line):
+            table = header[1]
+            lines.append(_comment(line, factors))
+        elif line.startswith("title = "):
+            lines.append(f'title = "{title}"')
+        elif table and (key := _KEY.fullmatch(line)):
+            lines.append(_key(table, key, factors))
+        else:
+            lines.append(line)
+    return "\n".join([f"# {title}.", "# What comments say of the motion is true of the starter.", "#", *lines, ""])
+
+
+def _key(table: str, found: re.Match[str], factors: Scales) -> str:
+    """A line with a key, whose comment stays in its column if it can."""
+    mark, name, equals, value, space, comment = found.groups("")
+    powers = _POWERS.get(f"{table}.{name}", _POWERS.get(name))
+    new = value if powers is None else _NUMBER.sub(partial(_times, factors, powers), value)
+    before = f"{mark}{name}{equals}"
+    width = len(before) + len(value) + len(space)
+    shown = f"{before}{new}".ljust(width) if comment else f"{before}{new}"
+    return shown + ("" if not comment or shown.endswith(" ") else " ") + _comment(comment, factors)
+
+
+def _comment(text: str, factors: Scales) -> str:
+    """A comment whose speeds and frequencies are scaled."""
+    for unit, powers in _IN_COMMENTS.items():
+        number = re.compile(rf"[\d.]+(?=(?: and [\d.]+)? {unit}\b)")
+        text = number.sub(partial(_times, factors, powers), text)
+    return text
+
+
+def _times(factors: Scales, powers: Scales, number: re.Match[str]) -> str:
+    """A number, scaled, in as many digits as are given of a brake; TOML tells 4 from 4.0."""
+    factor = math.prod(factor**power for factor, power in zip(factors, powers, strict=True))
+    shown = f"{float(number[0]) * factor:.{_DIGITS}g}"
+    return shown if any(sign in shown for sign in ".en") else f"{shown}.0"
