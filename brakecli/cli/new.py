@@ -25,7 +25,7 @@ def command(
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a commented starter case or sweep that runs, or a case for a brake of your own."""
+    """Write a commented case that runs, also of your own brake."""
     from brakecli.analysis.similar import Brake, similar
     from brakecli.case.read import starters
     from brakecli.files.atomic import new_output
