@@ -3,6 +3,7 @@
 import re
 import subprocess
 import sys
+from itertools import chain
 from pathlib import Path
 
 import nbformat
@@ -44,7 +45,7 @@ def write_commands(site: Sphinx) -> None:
     """Write the help of every command, as the program prints it."""
     parts = list[str]()
     terminal = {"COLUMNS": "80", "LANG": "C.UTF-8"}
-    for name in ("", *app.COMMANDS):
+    for name in ("", *chain(*app.GROUPS.values())):
         line = [sys.executable, "-m", "brakecli", *name.split(), "--help"]
         done = subprocess.run(line, capture_output=True, text=True, check=True, env=terminal)
         parts.append(f"## {name or 'brakecli'}\n\n```text\n{done.stdout.strip()}\n```\n")

@@ -1,6 +1,6 @@
 """The program: its commands, and the end of every failure in one sentence and an exit code.
 
-A new command is one file and one entry of `COMMANDS`. Heavy imports stand inside the functions of the commands, so
+A new command is one file and one entry of `GROUPS`. Heavy imports stand inside the functions of the commands, so
 that `--help` is quick.
 """
 
@@ -8,9 +8,11 @@ import os
 import resource
 import sys
 from importlib import import_module
-from typing import Annotated
+from itertools import chain
+from typing import Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from brakecli.about import __released__, __version__
 from brakecli.cli.options import option
@@ -21,11 +23,13 @@ from brakecli.files.trust import readings
 from brakecli.front.progress import say
 from brakecli.solver import compiling
 
-COMMANDS = (
-    *("run", "sweep", "classify", "compare-schemes", "stability", "branch", "scatter", "advise", "check"),
-    *("new", "schema", "plot", "report", "info", "diff", "export"),
-)
-"""In the order in which `--help` lists them."""
+GROUPS = {
+    "Ask": ("check", "stability", "branch", "advise", "scatter"),
+    "Simulate": ("run", "sweep", "compare-schemes"),
+    "Show": ("plot", "report", "info", "diff", "export", "classify"),
+    "Files": ("new", "schema"),
+}
+"""Commands by what they are for, in the order in which `--help` lists them."""
 
 CITATION = f"""\
 @software{{brakecli,
@@ -42,18 +46,35 @@ CITATION = f"""\
 }}"""
 """How to cite the program and the paper, in BibTeX; CITATION.cff says the same."""
 
+INDENT = 6
+"""Columns of `--help` beside names and descriptions of commands."""
 LIBRARIES = 1_075_000_000
 """Bytes of address space for the libraries and compiled kernels; to compile these takes `compiling.KERNELS`."""
 
+
+class Grouped(TyperGroup):
+    """The program, whose help lists commands by their groups."""
+
+    def format_commands(self, ctx: typer.Context, formatter: Any) -> None:
+        """Write a section for each group."""
+        longest = max(map(len, self.commands))
+        limit = formatter.width - longest - INDENT
+        for title, names in GROUPS.items():
+            with formatter.section(title):
+                rows = [(name.ljust(longest), self.commands[name].get_short_help_str(limit)) for name in names]
+                formatter.write_dl(rows)
+
+
 app = typer.Typer(
     name="brakecli",
+    cls=Grouped,
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
     help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, from which friction coefficient on.",
 )
-for name in COMMANDS:
+for name in chain(*GROUPS.values()):
     app.command(name)(import_module(f"brakecli.cli.{name.replace('-', '_')}").command)
 
 
