@@ -15,6 +15,7 @@ from typing import Any
 import pytest
 
 from brakecli.case.read import parse_case, starters
+from brakecli.cli.app import app
 from brakecli.front import progress
 from brakecli.front.tables import grid, verdict_table
 from brakecli.scattering.study import parse_study
@@ -30,8 +31,10 @@ def _eighty(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_each_command_says_in_a_whole_line_what_it_does(tmp_path: Path) -> None:
     shown = brakecli("--help", cwd=tmp_path, COLUMNS="80").out
-    lines = shown.partition("Commands:\n")[2].splitlines()
-    assert len(lines) >= 10
+    groups = re.findall(r"^(Ask|Simulate|Show|Files):\n((?:  .*\n)+)", shown, re.MULTILINE)
+    assert [name for name, _ in groups] == ["Ask", "Simulate", "Show", "Files"]
+    lines = [line for _, commands in groups for line in commands.splitlines()]
+    assert len(lines) == len(app.registered_commands)
     assert [line for line in lines if not re.fullmatch(r"  [a-z-]+ +[A-Z].*\.", line) or line.endswith("..")] == []
 
 
