@@ -55,7 +55,7 @@ LIBRARIES = 1_075_000_000
 class Grouped(TyperGroup):
     """The program, whose help lists commands by their groups."""
 
-    def format_commands(self, ctx: typer.Context, formatter: Any) -> None:
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a section for each group."""
         longest = max(map(len, self.commands))
         limit = formatter.width - longest - INDENT
