@@ -25,13 +25,16 @@ from brakecli.files.as_xarray import stored
 from brakecli.files.contents import DIFFERENCE_OF_TWO, Difference
 from brakecli.files.field import Field, values_of
 from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER, STABILITY, THRESHOLDS
-from brakecli.front.file_tables import diff_table
-from brakecli.front.render import TERMINAL
-from brakecli.front.stability_tables import advice_table
-from brakecli.front.tables import Row, two_columns, verdict_table
 from brakecli.runs.advise import AdviceReport
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.sweeps.attractors import Attractor
+from brakecli.views.file import of_difference
+from brakecli.views.motion import of_verdict
+from brakecli.views.points import regimes_sentence
+from brakecli.views.render import EXACT, TERMINAL, Renderer
+from brakecli.views.stability import of_advice, of_stability
+from brakecli.views.terminal import terminal_text
+from brakecli.views.view import Row, View, sentences
 
 _Record = TypeVar("_Record")
 _APART = {
@@ -42,6 +45,7 @@ _APART = {
     "eigenvalues",
     "title",
     "notes",
+    "sentence",
     "warnings",
     "indices_of",
 }
@@ -51,11 +55,15 @@ _TOLD = {each.name: each for kind in _KINDS for each in kind if each.name not in
 
 
 class Shown:
-    """What a notebook and a terminal show: the table, and below it the picture if there is one."""
+    """What a notebook and a terminal show: the view, and below it the picture if there is one."""
 
-    def table(self) -> str:
-        """The table as text, as wide as the terminal."""
+    def view(self, show: Renderer) -> View:
+        """Its view: the answer, then numbers and tables."""
         raise NotImplementedError
+
+    def table(self, *, details: bool = False) -> str:
+        """The view as text, as wide as the terminal; with all that is known if `details`."""
+        return terminal_text(self.view(EXACT if details else TERMINAL), details=details)
 
     def __repr__(self) -> str:
         """Show the table."""
@@ -74,23 +82,23 @@ class Shown:
 
 
 class Advice(AdviceReport, Shown):
-    """What `brakecli.advise` has found; its table is that of the command."""
+    """What `brakecli.advise` has found; its view is that of the command."""
 
     __repr__ = Shown.__repr__
 
-    def table(self) -> str:
-        """The table of the command."""
-        return advice_table(self)
+    def view(self, show: Renderer) -> View:
+        """The view of the command."""
+        return of_advice(self, show)
 
 
 class Differences(Difference, Shown):
-    """What `brakecli.diff` has found; its table is that of the command."""
+    """What `brakecli.diff` has found; its view is that of the command."""
 
     __repr__ = Shown.__repr__
 
-    def table(self) -> str:
-        """The table of the command."""
-        return diff_table({"a": "a", "b": "b", "output": ""}, values_of(DIFFERENCE_OF_TWO, self))
+    def view(self, show: Renderer) -> View:
+        """The view of the command."""
+        return of_difference(values_of(DIFFERENCE_OF_TWO, self), {"a": "a", "b": "b", "output": ""}, show)
 
 
 @xr.register_dataset_accessor("brakecli")
@@ -155,26 +163,44 @@ class Accessor(Shown):
             each["share"] = Probability(*map(each.pop, ("share", "share_lower", "share_upper")))
         return tuple(Attractor(**each) for each in found)
 
-    def table(self) -> str:
-        """Its single numbers, and what is said of it; a verdict as `brakecli classify` shows it, less evidence."""
+    def view(self, show: Renderer) -> View:
+        """Its answer, its single numbers, and what is said of it; a verdict as `brakecli classify` shows it."""
         single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
         held = {str(name): _known(value) for name, value in (self._found.attrs | single).items()}
         title = str(held.get("title") or "")
         if "excitation" in held:
             lists = {name: [vars(each) for each in getattr(self, name)] for name in ("vibrations", "bursts")}
-            missing = dict.fromkeys(each.name for each in fields.VERDICT)
-            return verdict_table(title, {**missing, **held, **lists, "reasons": self.reasons, "evidence": {}})
+            return of_verdict(
+                {**held, **lists, "reasons": self.reasons, "evidence": self._evidence()}, title, show
+            )
+        if "undamped_flutter_friction" in held:
+            objects = {name: self._parsed(name) for name in ("modes", "crossings", "equilibrium", "discrete")}
+            return of_stability({**held, **objects}, title, show)
+        answer = [str(held.get("sentence") or "")]
+        if "regime" in self._found:
+            regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist())
+            answer.append(regimes_sentence(dict(sorted(regimes.items())), regimes.total()))
         told = [each for name, each in _TOLD.items() if name in held]
-        rows: list[Row] = [(each.title, TERMINAL.field(each, held[each.name])) for each in told]
-        regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist() if "regime" in self._found else ())
-        rows += [(name, f"at {count} of {regimes.total()}") for name, count in regimes.most_common()]
+        rows = [Row(field.title, show.field(field, held[field.name])) for field in told]
         rows += [
-            (f"attractor {each.attractor}", f"{each.regime}, {each.share.value:.1%}") for each in self.attractors
+            Row(f"attractor {each.attractor}", f"{each.regime}, {each.share.value:.1%}")
+            for each in self.attractors
         ]
-        rows += [("mode", f"{each.frequency:.5g} Hz, {each.growth:+.4g} 1/s") for each in self.modes]
-        branches = [each for each in self._groups.values() if "kind" in each.attrs]
-        rows += [(str(each.name), f"{each.attrs['kind']}, {each.sizes['point']} motions") for each in branches]
-        return two_columns(title, [*rows, ("note", [*self._texts("notes"), *self.warnings])])
+        branches = [group for group in self._groups.values() if "kind" in group.attrs]
+        rows += [Row(str(one.name), f"{one.attrs['kind']}, {one.sizes['point']} motions") for one in branches]
+        rows += [Row("note", note) for note in (*self._texts("notes"), *self.warnings)]
+        return View(title, sentences(answer), rows)
+
+    def _evidence(self) -> dict[str, Any]:
+        """The numbers by which a verdict was decided."""
+        if "regime" in self._groups and "evidence" in self._groups["regime"].children:
+            return {str(name): _known(value) for name, value in self._groups["regime"]["evidence"].attrs.items()}
+        return dict(self._parsed("evidence") or {})
+
+    def _parsed(self, name: str) -> Any:
+        """A list or an object among the attributes."""
+        given = self._found.attrs.get(name)
+        return json.loads(given) if isinstance(given, str) and given else given
 
     def _repr_png_(self) -> bytes | None:
         from brakecli.plots.result import plot_result

@@ -193,7 +193,7 @@ def advise(
             left out.
         margin: part of its friction by which the case is to stay stable above it, from 0 to 10.
         scatter: path of a study file, or what `load` gave: advice is ranked by the probability of squeal that is
-            left.
+            left. If left out, stiffnesses and friction scatter by 10 %, and the smallest change comes first.
         progress: as for `run`.
 
     Returns:
@@ -218,8 +218,11 @@ def advise(
         load_kernels(loaded)
         with within_range():
             report = advise(loaded, patterns, margin, tell)
-            if study is not None:
-                from brakecli.scattering.advised import under_scatter
+            from brakecli.scattering.advised import under_scatter, under_tolerance
+
+            if study is None:
+                report = under_tolerance(report, loaded.case)
+            else:
                 from brakecli.scattering.scatter import engine_for
 
                 report = under_scatter(report, loaded, study, partial(engine_for, in_caller=True), tell)

@@ -1,15 +1,16 @@
 """`brakecli advise`."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, CaseArgument, ForceRead, Overrides, Quiet, option
+from brakecli.cli.options import AsJson, CaseArgument, Details, ForceRead, Overrides, Quiet, option
 from brakecli.cli.output import show_result, warn
 from brakecli.front.inputs import load_case, load_study
 from brakecli.front.progress import say, telling
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
-STUDY = "Rank by the probability of squeal that is left where keys scatter as in a study, in place of its case."
+STUDY = "Rank by the squeal that is left where keys scatter as in a study."
 MARGIN = "Part of its friction by which the case is to stay stable above it."
 
 
@@ -20,6 +21,7 @@ def command(
     margin: Annotated[float, option(MARGIN, "PART", min=0.0, max=10.0)] = 0.2,
     scatter: Annotated[str | None, option(STUDY, "STUDY.toml", "--scatter")] = None,
     force_read: ForceRead = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -27,21 +29,25 @@ def command(
     loaded = load_case(case, overrides)
     study = replace(load_study(scatter, None), base=loaded) if scatter is not None else None
     from brakecli.analysis.stability.advice import KEYS as USUAL
-    from brakecli.front.stability_tables import advice_table
     from brakecli.runs.advise import advise, advise_seconds
     from brakecli.runs.cost import duration_text
     from brakecli.runs.limits import WORTH_SAYING, within_range
     from brakecli.runs.run import load_kernels
+    from brakecli.views.stability import of_advice
 
     load_kernels(loaded)
     with telling(quiet) as show_progress, within_range():
         if (seconds := advise_seconds(loaded)) > WORTH_SAYING and not quiet:
             say(f"a rough pad: this takes about {duration_text(seconds)}")
         report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)
-        if study is not None:
-            from brakecli.scattering.advised import under_scatter
+        from brakecli.scattering.advised import under_scatter, under_tolerance
+
+        if study is None:
+            report = under_tolerance(report, loaded.case)
+        else:
             from brakecli.scattering.scatter import engine_for
 
             report = under_scatter(report, loaded, study, engine_for, show_progress)
             warn(*study.beside(loaded.case))
-    show_result("advise", report.numbers(), advice_table, report, as_json=as_json, quiet=quiet)
+    view = partial(of_advice, report)
+    show_result("advise", report.numbers(), view, as_json=as_json, quiet=quiet, details=details)

@@ -1,6 +1,7 @@
 """`brakecli branch`."""
 
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -8,6 +9,7 @@ from brakecli.branches.pushes import PUSHES
 from brakecli.cli.options import (
     AsJson,
     CaseArgument,
+    Details,
     Force,
     ForceRead,
     Overrides,
@@ -37,6 +39,7 @@ def command(
     pushes: Pushes = PUSHES,
     force_read: ForceRead = False,
     force: Force = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -50,10 +53,10 @@ def command(
     from brakecli.files.field import values_of
     from brakecli.files.stability_fields import BRANCH
     from brakecli.files.write import new_result
-    from brakecli.front.stability_tables import branch_table
     from brakecli.runs.branch import branch, line_of, start_of, states_of, write
     from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
+    from brakecli.views.stability import of_branch
 
     with telling(quiet) as tell:
         with within_range():
@@ -71,5 +74,5 @@ def command(
             if target:
                 write(target, loaded, found, units, force=force)
     numbers = {**values_of(BRANCH, found), "output": target and str(target)}
-    shown = loaded.case.title, found, units, target
-    show_result("branch", numbers, branch_table, *shown, as_json=as_json, quiet=quiet)
+    view = partial(of_branch, numbers, loaded.case.title, units)
+    show_result("branch", numbers, view, as_json=as_json, quiet=quiet, details=details)

@@ -1,6 +1,7 @@
 """`brakecli check`."""
 
 import math
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -21,21 +22,22 @@ def command(
     """Validate a case or a sweep; estimate its cost and limits."""
     if kind_of_file(file) == "sweep":
         sweep = load_sweep(file, overrides)
-        from brakecli.front.tables import estimate_table
         from brakecli.runs.limits import free_bytes
         from brakecli.sweeps.cost import estimate, refuse_sweep
         from brakecli.sweeps.driver import crew
+        from brakecli.views.file import of_estimate
 
         cost = estimate(sweep.plan, crew(sweep.plan), spare=True)
         numbers = {"valid": True, **vars(cost)}
-        show_result("check", numbers, estimate_table, sweep.title, cost, as_json=as_json, quiet=quiet)
+        view = partial(of_estimate, cost, sweep.title)
+        show_result("check", numbers, lambda show: view(), as_json=as_json, quiet=quiet)
         warn(*cost.refused, *cost.implausible)
         refuse_sweep(cost, free_bytes(Path()))
         return
     loaded = load_case(file, overrides)
     from brakecli.case.system import system_of
-    from brakecli.front.tables import check_table
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
+    from brakecli.views.file import of_check
 
     with within_range():
         found = check(system_of(loaded.case), begin=True)
@@ -44,6 +46,6 @@ def command(
     infinite = [name for name, value in numbers.items() if value in (math.inf, -math.inf)]
     for name in ("system", "limits", *infinite):
         del numbers[name]
-    show_result("check", numbers, check_table, loaded.case.title, found, as_json=as_json, quiet=quiet)
+    show_result("check", numbers, partial(of_check, found, loaded.case.title), as_json=as_json, quiet=quiet)
     warn(*found.warnings)
     refuse(found, free_bytes(Path()))

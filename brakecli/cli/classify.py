@@ -1,9 +1,10 @@
 """`brakecli classify`."""
 
+from functools import partial
 from typing import Annotated
 
 from brakecli.cli.measured import UNMEASURED, with_measured
-from brakecli.cli.options import AsJson, ForceRead, Quiet, option, source_argument
+from brakecli.cli.options import AsJson, Details, ForceRead, Quiet, option, source_argument
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.front.measured import Measured
@@ -23,6 +24,7 @@ def command(
     thresholds: Annotated[list[str] | None, THRESHOLD] = None,
     second_run: Annotated[bool, option("Gone.", None, "--second-run", hidden=True)] = False,
     force_read: ForceRead = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -30,15 +32,16 @@ def command(
     if second_run:
         raise UsageError(f"--second-run: {_NO_SECOND}")
     if len(sources) == 1:
-        from brakecli.front.tables import verdict_table
+        from brakecli.views.motion import of_verdict
 
         source = sources[0]
         numbers = verdict_on(sources[0], measured, thresholds)
         warn(*numbers.get("warnings", ()))
         shown = {"source": source, **numbers}
-        show_result("classify", shown, verdict_table, source, numbers, as_json=as_json, quiet=quiet)
+        view = partial(of_verdict, numbers, source)
+        show_result("classify", shown, view, as_json=as_json, quiet=quiet, details=details)
         return
-    from brakecli.front.tables import verdicts_table
+    from brakecli.views.motion import of_verdicts
 
     results = []
     failures = []
@@ -49,6 +52,7 @@ def command(
         except (UnreadableResultError, UsageError) as error:
             failures.append(error)
             results.append({"source": source, "error": str(error)})
-    show_result("classify", {"results": results}, verdicts_table, results, as_json=as_json, quiet=quiet)
+    found = {"results": results}
+    show_result("classify", found, lambda show: of_verdicts(results), as_json=as_json, quiet=quiet)
     if failures:
         raise type(failures[0])("\n".join(dict.fromkeys(str(error) for error in failures)))

@@ -3,7 +3,17 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, CaseArgument, Force, ForceRead, Overrides, Quiet, option, output_option
+from brakecli.cli.options import (
+    AsJson,
+    CaseArgument,
+    Details,
+    Force,
+    ForceRead,
+    Overrides,
+    Quiet,
+    option,
+    output_option,
+)
 from brakecli.cli.output import show_result
 from brakecli.front.inputs import load_case, result_path
 from brakecli.front.progress import telling
@@ -23,6 +33,7 @@ def command(
     target_error: Annotated[float, option(TARGET, "E", min=1e-12, max=1.0)] = 1e-3,
     force_read: ForceRead = False,
     force: Force = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -33,8 +44,8 @@ def command(
     from brakecli.comparison.methods import parse_schemes, parse_steps
     from brakecli.comparison.result import ComparisonReport, write
     from brakecli.files.write import new_result
-    from brakecli.front.tables import comparison_table
     from brakecli.runs.run import load_kernels
+    from brakecli.views.points import of_comparison
 
     chosen = parse_schemes(schemes)
     ladder = parse_steps(steps)
@@ -46,4 +57,11 @@ def command(
         report = ComparisonReport(target, loaded.case, found, target_error)
         write(target, loaded, report, force=force)
     numbers = {"output": str(target), **report.numbers()}
-    show_result("compare-schemes", numbers, comparison_table, report, as_json=as_json, quiet=quiet)
+    show_result(
+        "compare-schemes",
+        numbers,
+        lambda show: of_comparison(report),
+        as_json=as_json,
+        quiet=quiet,
+        details=details,
+    )

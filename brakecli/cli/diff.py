@@ -1,9 +1,10 @@
 """`brakecli diff`."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, Force, ForceRead, Quiet, option, output_option, source_argument
+from brakecli.cli.options import AsJson, Details, Force, ForceRead, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show_result
 
 VARIABLE = "What is drawn of two runs, vx if left out, or of two other results."
@@ -16,6 +17,7 @@ def command(
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
     force_read: ForceRead = False,
     force: Force = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -23,7 +25,7 @@ def command(
     from brakecli.files.contents import DIFFERENCE_OF_TWO, difference
     from brakecli.files.field import values_of
     from brakecli.files.read import open_result
-    from brakecli.front.file_tables import diff_table
+    from brakecli.views.file import of_difference
 
     with open_result(first) as a, open_result(second) as b:
         numbers = values_of(DIFFERENCE_OF_TWO, difference(a, b))
@@ -31,5 +33,13 @@ def command(
         from brakecli.plots.result import plot_two
 
         plot_two(first, second, output, force=force, variable=variable or "")
-    files = {"a": str(first), "b": str(second), "output": output and str(output)}
-    show_result("diff", {**files, **numbers}, diff_table, files, numbers, as_json=as_json, quiet=quiet)
+    files = {"a": str(first), "b": str(second), "output": str(output or "")}
+    view = partial(of_difference, numbers, files)
+    show_result(
+        "diff",
+        {**files, "output": output and str(output), **numbers},
+        view,
+        as_json=as_json,
+        quiet=quiet,
+        details=details,
+    )

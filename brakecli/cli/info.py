@@ -16,8 +16,8 @@ def command(
     from brakecli.files.contents import INFO, contents
     from brakecli.files.field import values_of
     from brakecli.files.read import open_result
-    from brakecli.front.file_tables import info_table
+    from brakecli.views.file import of_info
 
     with open_result(result) as stored:
         numbers = values_of(INFO, contents(stored))
-    show_result("info", numbers, info_table, numbers, as_json=as_json, quiet=False)
+    show_result("info", numbers, lambda show: of_info(numbers), as_json=as_json, quiet=False)

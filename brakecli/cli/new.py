@@ -29,7 +29,7 @@ def command(
     from brakecli.analysis.similar import Brake, similar
     from brakecli.case.read import starters
     from brakecli.files.atomic import new_output
-    from brakecli.front.tables import grid
+    from brakecli.views.terminal import grid
 
     texts = starters()
     if listed:

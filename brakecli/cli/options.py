@@ -40,6 +40,9 @@ def _compile_in_silence(quiet: bool) -> bool:
     return quiet
 
 
+Details = Annotated[
+    bool, option("Print all: evidence, scheme, model, account of energies, every row.", None, "--details")
+]
 QUIET = option("Print nothing but warnings and errors.", None, "--quiet", "-q", callback=_compile_in_silence)
 Quiet = Annotated[bool, QUIET]
 FORCE_READ = "Look at a result whose digest does not fit, as of a damaged file; what is made of it says so."

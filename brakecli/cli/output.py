@@ -4,11 +4,15 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from brakecli.files.os_signals import Styled
 from brakecli.files.trust import readings
 from brakecli.front.progress import say, telling
+
+if TYPE_CHECKING:
+    from brakecli.views.render import Renderer
+    from brakecli.views.view import View
 
 
 def show(text: str) -> None:
@@ -23,13 +27,23 @@ def show_json(value: Mapping[str, Any], indent: int | None = None) -> None:
 
 
 def show_result(
-    command: str, numbers: Mapping[str, Any], table: Callable[..., str], *found: Any, as_json: bool, quiet: bool
+    command: str,
+    numbers: Mapping[str, Any],
+    view: "Callable[[Renderer], View]",
+    *,
+    as_json: bool,
+    quiet: bool,
+    details: bool = False,
 ) -> None:
-    """Print what a command has found: its numbers as JSON, or the table of what was found, or nothing."""
+    """Print what a command has found: its numbers as JSON, or its view, with all `details`; or nothing."""
     if as_json:
         show_json({"command": command, **readings.noted(), **numbers})
     elif not quiet:
-        print(table(*found), file=Styled(sys.stdout), flush=True)  # it escapes what is in its cells
+        from brakecli.views.render import EXACT, TERMINAL
+        from brakecli.views.terminal import terminal_text
+
+        text = terminal_text(view(EXACT if details else TERMINAL), details=details)
+        print(text, file=Styled(sys.stdout), flush=True)  # it escapes what is in its cells
 
 
 def warn(*warnings: str) -> None:

@@ -1,9 +1,19 @@
 """`brakecli run`."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, Force, ForceRead, Overrides, Quiet, output_option, source_argument
+from brakecli.cli.options import (
+    AsJson,
+    Details,
+    Force,
+    ForceRead,
+    Overrides,
+    Quiet,
+    output_option,
+    source_argument,
+)
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_case, result_path
@@ -18,14 +28,15 @@ def command(
     overrides: Overrides = None,
     force_read: ForceRead = False,
     force: Force = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Simulate one case; write motion and regime to HDF5."""
     loaded = load_case(case, overrides)
     target = result_path(output, case)
-    from brakecli.front.tables import run_table
     from brakecli.runs.run import load_kernels, origin, run
+    from brakecli.views.motion import of_run
 
     load_kernels(loaded)
     with telling(quiet) as show_progress:
@@ -34,7 +45,8 @@ def command(
         say(*report.check.adjustments)
     warn(*report.warnings)
     numbers = {"output": str(report.output), **origin("run", report.title, report.loaded), **report.numbers()}
-    show_result("run", numbers, run_table, report, as_json=as_json, quiet=quiet)
+    view = partial(of_run, numbers, report.title, str(report.output))
+    show_result("run", numbers, view, as_json=as_json, quiet=quiet, details=details)
     if report.motion.work.failed:
         say(f"{report.output}: the history up to the failure was written")
         raise BrakecliError(str(report.motion.work.failure_sentence))

@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import SET, AsJson, Force, Quiet, option, output_option, source_argument
+from brakecli.cli.options import SET, AsJson, Details, Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show_result, warn
 from brakecli.cli.sweep import JOBS, SCHEDULER, SCHEDULER_FILE
 from brakecli.front.inputs import load_study, result_path
@@ -21,15 +21,16 @@ def command(
     scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
     scheduler_file: Annotated[str | None, option(SCHEDULER_FILE, "FILE")] = None,
     force: Force = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """How likely brakes squeal whose numbers scatter."""
     loaded = load_study(file, overrides)
     target = result_path(output, file, kind="study")
-    from brakecli.front.stability_tables import scatter_table
     from brakecli.scattering.scatter import engine_for, scatter
     from brakecli.sweeps.driver import keeping_points
+    from brakecli.views.stability import of_scatter
 
     engine_of = partial(engine_for, jobs=jobs, scheduler=scheduler, scheduler_file=scheduler_file)
     with telling(quiet) as tell, keeping_points(target):
@@ -37,4 +38,7 @@ def command(
     if report.failed:
         warn(f"{report.failed} of {report.samples} samples have no answer, the first: {report.first_failure}")
     numbers = {**report.numbers(), "output": str(report.output)}
-    show_result("scatter", numbers, scatter_table, report, as_json=as_json, quiet=quiet)
+    title = report.loaded.title
+    show_result(
+        "scatter", numbers, lambda show: of_scatter(numbers, title), as_json=as_json, quiet=quiet, details=details
+    )

@@ -8,6 +8,7 @@ from brakecli.branches.pushes import PUSHES
 from brakecli.cli.options import (
     AsJson,
     CaseArgument,
+    Details,
     Force,
     ForceRead,
     Overrides,
@@ -24,6 +25,8 @@ from brakecli.front.progress import say, telling
 
 if TYPE_CHECKING:
     from brakecli.sweeps.tables import Axis
+    from brakecli.views.render import Renderer
+    from brakecli.views.view import View
 
 VARY = "Follow both modes along a key, or along several alike."
 MOST_VALUES = 10_000
@@ -37,6 +40,7 @@ def command(
     pushes: Pushes = PUSHES,
     force_read: ForceRead = False,
     force: Force = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -53,8 +57,9 @@ def command(
     from brakecli.case.system import system_of
     from brakecli.files.field import values_of
     from brakecli.files.stability_fields import LOCK_IN, STABILITY, THRESHOLDS
-    from brakecli.front.stability_tables import stability_table
     from brakecli.runs.limits import sliding_text, within_range
+    from brakecli.sweeps.result import unit
+    from brakecli.views.stability import of_stability
 
     with telling(quiet) as show_progress, within_range():
         if (text := sliding_text(system := system_of(loaded.case))) and not quiet:
@@ -78,8 +83,12 @@ def command(
         numbers |= values_of(THRESHOLDS, both)
     if found:
         numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
-    shown = loaded.case.title, report, found, both, target
-    show_result("stability", numbers, stability_table, *shown, as_json=as_json, quiet=quiet)
+    units = unit(axis.parameter[0]) if axis else ""
+
+    def view(show: "Renderer") -> "View":
+        return of_stability(numbers, loaded.case.title, show, units)
+
+    show_result("stability", numbers, view, as_json=as_json, quiet=quiet, details=details)
 
 
 def _parse_axis(text: str) -> "Axis":

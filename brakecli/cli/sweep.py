@@ -1,9 +1,10 @@
 """`brakecli sweep`."""
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import SET, AsJson, Quiet, option, output_option, source_argument
+from brakecli.cli.options import SET, AsJson, Details, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
 from brakecli.front.inputs import load_sweep, result_path
@@ -26,6 +27,7 @@ def command(
     scheduler_file: Annotated[str | None, option(SCHEDULER_FILE, "FILE")] = None,
     task_size: Annotated[int | None, option(TASK_SIZE, min=1)] = None,
     force: Annotated[bool, option(REPLACE, None, "--force")] = False,
+    details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -35,10 +37,10 @@ def command(
     """
     loaded = load_sweep(file, overrides)
     target = result_path(output, file, kind="sweep")
-    from brakecli.front.tables import sweep_table
     from brakecli.runs.run import load_kernels
     from brakecli.sweeps.cost import Estimate
     from brakecli.sweeps.driver import choose_engine, counting, keeping_points, sweep
+    from brakecli.views.points import of_sweep
 
     load_kernels(loaded.base)
     with telling(quiet) as show_progress:
@@ -55,7 +57,7 @@ def command(
     if found.warned:
         warn(f"points that ran with warnings: {found.warned}, the first: {found.first_warning}")
     numbers = {"output": str(report.output), **report.numbers()}
-    show_result("sweep", numbers, sweep_table, report, as_json=as_json, quiet=quiet)
+    show_result("sweep", numbers, partial(of_sweep, report), as_json=as_json, quiet=quiet, details=details)
     for failure in found.failures:
         where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
         say(f"point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")

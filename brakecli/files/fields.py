@@ -45,7 +45,12 @@ VERDICT = within(
     Field("amplitude_forced", "m", "on a rough wheel: what the roughness forces"),
     Field("amplitude_own", "m", "on a rough wheel: what the shoe adds"),
     Field("frequency_resolution", "Hz", "distance of two lines in the spectrum"),
-    Field("torque_variation", "N m", "braking torque, peak to peak; missing if it rings or samples miss impacts"),
+    Field(
+        "torque_variation",
+        "N m",
+        "braking torque, peak to peak; missing if it rings or samples miss impacts",
+        label="torque variation (peak to peak)",
+    ),
     integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged"),
     Field("settled_from", "s", "start of the settled part, or of the second half"),
     Field("mean_friction_force", "N", "mean friction force on the shoe, from `settled_from` on"),

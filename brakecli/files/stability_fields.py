@@ -193,7 +193,10 @@ SENSITIVITY = (
     Field("growth_derivative", "1/s per unit", "growth rate at φ by the value; for lists by their factor"),
 )
 _LEFT = (
-    ratio("squeal_probability", "with a study of scatter: part of such brakes that squeal; null without one"),
+    ratio(
+        "squeal_probability",
+        "part of such brakes that squeal where stiffnesses and friction scatter by 10 %, or keys as in a study",
+    ),
     ratio("squeal_lower", "lower end of its 95 % interval"),
     ratio("squeal_upper", "upper end"),
 )

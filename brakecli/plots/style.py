@@ -22,6 +22,7 @@ from brakecli.files.field import labelled as labelled
 from brakecli.files.read import StoredResult
 from brakecli.files.trust import readings
 from brakecli.files.write import FILL
+from brakecli.views.render import prefixed as prefixed
 
 Array = NDArray[Any]
 
@@ -161,20 +162,6 @@ def unreadable(result: StoredResult, reason: str) -> UnreadableResultError:
 def largest(values: Array) -> float:
     """The largest magnitude of the finite values, 0 if there are none."""
     return float(np.max(np.abs(values), where=np.isfinite(values), initial=0.0))
-
-
-def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
-    """The factor for values up to this magnitude that makes them easy to read, and the unit with its SI prefix.
-
-    Prefixes are those that engineers use: no km/s, kHz from ten of them on, none for angles and pure numbers.
-    """
-    large = (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP"
-    small = unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP"
-    for exponent, prefix in ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p")):
-        wanted = unit and (large if exponent > 0 else small or exponent == 0)
-        if wanted and 10.0**exponent <= magnitude < 1e12:
-            return 10.0**-exponent, prefix + unit
-    return 1.0, unit
 
 
 def readable(value: float, digits: int = 6) -> str:

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 from brakecli.files.field import Field
-from brakecli.front.render import Renderer
 from brakecli.plots import style
 from brakecli.sweeps.result import unit
+from brakecli.views.render import Renderer
 
 Numbers = Mapping[str, tuple[Any, str]]
 """What two results are compared by: values with their units, by their names."""

@@ -1,16 +1,15 @@
 """The part of a page about a run: whether the shoe vibrates, why, what to change, and how sure that is."""
 
 import math
-import re
 import shlex
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from functools import partial
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from brakecli.analysis.regime.decision import Excitation, Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.stability.advice import KEYS, Change
 from brakecli.analysis.stability.follow import followed
 from brakecli.analysis.stability.modes import Mode, modes
@@ -22,13 +21,17 @@ from brakecli.files import fields
 from brakecli.files.field import flat, named
 from brakecli.files.read import StoredResult
 from brakecli.files.stability_fields import ADVICE
+from brakecli.files.write import FILL
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
 from brakecli.reports.blocks import PAGE, Code, Part, Section, Table, Texts, numbers_of, percent, picture, shown
 from brakecli.runs.advise import AdviceReport, advise
+from brakecli.scattering.advised import under_tolerance
 from brakecli.solver.integrate import Counted
 from brakecli.sweeps.result import unit
+from brakecli.views.motion import motion_sentence, reasons_of
+from brakecli.views.view import sentences
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
@@ -43,12 +46,6 @@ MOST_CHANGES = 5
 MOST_SECONDS = 60.0  # what it may take to ask all
 _UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
-_LENGTH = re.compile(r"(\d+(?:\.\d+)?(?:e[-+]\d+)?) m(?![\w/²·])")
-_WORDS = {
-    Regime.RELAXATION: "It vibrates, with stick in every cycle or nearly (relaxation)",
-    Regime.QUASI_HARMONIC: "It vibrates, without stick (quasi-harmonic)",
-    Regime.DAMPED: "It does not vibrate by itself: what moves it dies away (damped)",
-}
 _MAIN = (
     *("regime", "excitation", "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
     *("growth_rate", "braking_torque", "torque_variation"),
@@ -63,25 +60,20 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found = result.attributes
     loaded = case_of(result)
-    advice = advise(loaded, KEYS, MARGIN, progress, most=MOST_SECONDS)
+    advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_SECONDS), loaded.case)
     again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
-    left_out = _sentences("left out: ", found.get("left_out", ()))
+    left_out = sentences(f"Left out: {each}" for each in found.get("left_out", ()))
     sections = [
         Section("Case", case_blocks(loaded)),
         Section("Stability of steady sliding", [*_stability(advice)]),
         Section("Regime, and its evidence", _regime(result)),
-        Section(
-            "Accuracy", [*_accuracy(result), Texts([*_sentences("", found.get("adjustments", ())), *left_out])]
-        ),
-        Section("Warnings", [Texts(_sentences("", found.get("warnings", ())) or ["There are none."])]),
+        Section("Accuracy", [*_accuracy(result), Texts([*sentences(found.get("adjustments", ())), *left_out])]),
+        Section("Warnings", [Texts(sentences(found.get("warnings", ())) or ["There are none."])]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
-    stretches = [
-        f"It vibrates from {shown(start, 's')} to {shown(end, 's')}: {shown(rate, 'Hz')} at {shown(speed, 'm/s')}."
-        for start, end, rate, _, speed in _vibrations(result)
-    ]
     theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
-    answer = [*stretches, _sentence(found), theory]
+    said = {**found, "vibrations": _vibrations(result), "evidence": result.group_attributes("regime/evidence")}
+    answer = [motion_sentence(said, PAGE, full=True), theory]
     name = escaped(result.path.name)
     title = loaded.case.title or "Case without a title"
     numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
@@ -105,7 +97,7 @@ def _to_change(advice: AdviceReport, regime: Any) -> Iterator[Any]:
     if check := advice.check:
         what = f"A run of the case with {check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
         lines.append(f"{what}: {check.verdict.regime}: {'; '.join(check.verdict.reasons)}.")
-    yield Texts([*lines, *_sentences("", advice.notes())])
+    yield Texts([*lines, *sentences(advice.notes())])
 
 
 def _changes(changes: Iterable[Change], margin: float) -> Table:
@@ -144,35 +136,6 @@ def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
     report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
-
-
-def _sentence(found: Mapping[str, Any]) -> str:
-    """What the run has shown."""
-    if found.get("status") == "failed":
-        return f"The run failed: {found.get('failure', '')}."
-    regime = found.get("regime")
-    numbers = []
-    reasons = "; ".join(_reasons(found))
-    words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
-    if regime == Regime.DAMPED and found.get("excitation") == Excitation.FORCED:
-        words = "It does not vibrate by itself: the roughness of the wheel shakes it (damped, forced)"
-    if not words:
-        return f"The run does not decide it: {reasons}."
-    if (frequency := found.get("frequency")) is not None:
-        numbers.append(f"at {frequency:.4g} Hz")
-    if (amplitude := found.get("amplitude")) is not None and numbers:
-        numbers.append(f"amplitude along the wheel {shown(float(f'{amplitude:.3g}'), 'm')}")
-    for name, what in (("stick_fraction", "stick"), ("contact_loss_fraction", "no contact")):
-        if numbers and (share := found.get(name)):
-            numbers.append(f"{what} {share:.1%} of the time")
-    return f"{', '.join([words, *numbers])}: {reasons}."
-
-
-def _reasons(found: Mapping[str, Any]) -> list[str]:
-    """Why the regime is what it is; lengths have the same prefix as elsewhere on the page."""
-    return [
-        _LENGTH.sub(lambda each: shown(float(each[1]), "m"), str(reason)) for reason in found.get("reasons", ())
-    ]
 
 
 def _stability(advice: AdviceReport) -> Iterator[Any]:
@@ -239,32 +202,30 @@ def _regime(result: StoredResult) -> list[Any]:
         (name.replace("_", " "), shown(value, fields.evidence_unit(name)))
         for name, value in sorted(evidence.items())
     ]
-    reasons = Texts(_sentences("", _reasons(found)))
-    intervals = _vibrations(result)
+    reasons = Texts(sentences(reasons_of(found, PAGE)))
+    intervals = [[each[field.name] for field in fields.VIBRATION] for each in _vibrations(result)]
     head = [each.meaning for each in fields.VIBRATION]
     beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
     shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the table decided")
     return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
 
 
-def _vibrations(result: StoredResult) -> list[list[float]]:
-    """Where speed or load change: start, end, frequency, amplitude and speed of each interval of vibration."""
+def _vibrations(result: StoredResult) -> list[dict[str, float | None]]:
+    """Where speed or load change: the intervals of vibration, four digits of each number."""
     if "vibrations" not in result.file:
         return []
     columns = [result.read("vibrations", each.name) for each in fields.VIBRATION]
-    return [[float(f"{value:.4g}") for value in row] for row in zip(*columns, strict=True)]
+    names = [each.name for each in fields.VIBRATION]
+    rows = [
+        [None if value == FILL else float(f"{value:.4g}") for value in row] for row in zip(*columns, strict=True)
+    ]
+    return [dict(zip(names, row, strict=True)) for row in rows]
 
 
 def _accuracy(result: StoredResult) -> list[Any]:
     error = abs(float(result.group_attributes("energy").get("relative_closing_error", math.nan)))
     closing = "energy account", f"{error:.1e}", "what it does not account for, over its largest item"
     return [Table([*PAGE.rows(named(fields.RUN, *_ACCURACY), result.attributes), closing])]
-
-
-def _sentences(begin: str, lines: Iterable[str]) -> list[str]:
-    """Lines as sentences; a key at the head of one is spelled as in the case."""
-    texts = (f"{begin}{each}." for each in lines)
-    return [text if text.partition(" ")[0].endswith(":") else f"{text[:1].upper()}{text[1:]}" for text in texts]
 
 
 def _meaning(key: str) -> str:

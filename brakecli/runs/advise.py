@@ -61,6 +61,7 @@ class AdviceReport:
     thresholds: Thresholds
     left_out: str = ""  # what was not asked, as it takes too long
     squeal: Left | None = None  # of the case itself, under scatter
+    scatter: str = ""  # which one, in words
 
     @property
     def margin(self) -> float | None:
@@ -116,16 +117,24 @@ class AdviceReport:
         elif not report.stable:
             first = report.modes[0]
             yield f"squeals at {first.frequency:.4g} Hz" if first.frequency else "locks, without vibration"
+        elif critical:
+            yield "does not squeal by itself"
         if critical == 0.0:
             yield "unstable at any friction, however small"
-        elif critical is not None:
-            yield f"stable up to a friction coefficient of {critical:.3g}{_far(self.margin, own)}"
+        elif critical is not None and report.critical is not None:
+            tone = report.critical.frequency
+            at = f" at {tone:.4g} Hz" if tone and report.stable else ""
+            lost = f"sliding loses its stability{at} from a friction coefficient of {critical:.3g} on"
+            yield f"{lost}{_far(self.margin, own)}"
             if report.stable and critical < own:
                 changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
                 turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)
                 yield f"the case lies above a range of instability, as stability is {turns}"
             if self.thresholds.beside:
                 yield self.thresholds.beside
+            if self.squeal:
+                part = 100.0 * self.squeal.squeal_probability
+                yield f"under a scatter {self.scatter} {part:.2g} % of such brakes squeal"
         elif report.equilibrium is not None and report.contact_stiffness > 0.0:
             searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
             yield f"stable: no friction makes it unstable{searched}"
@@ -140,12 +149,9 @@ class AdviceReport:
         critical = best.critical_friction
         effect = "takes the instability away"
         if critical is not None:
-            effect = f"makes it stable up to a friction of {critical:.3g}"
-        yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}"
-        if self.squeal and best.squeal:
-            own = self.squeal.squeal_probability
-            left = best.squeal.squeal_probability
-            yield f"under scatter {left:.2%} of such brakes squeal in place of {own:.2%}"
+            effect = f"moves the loss of stability to {critical:.3g}"
+        left = "" if best.squeal is None else f", and {100.0 * best.squeal.squeal_probability:.2g} % squeal"
+        yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}{left}"
         if best.check is None:
             yield "no run has checked that"
         elif best.check == Regime.UNDECIDED:

@@ -8,8 +8,10 @@ import pytest
 
 from brakecli.analysis.stability.advice import KEYS
 from brakecli.case.read import parse_case, read_text
-from brakecli.front.stability_tables import advice_table
 from brakecli.runs.advise import advise
+from brakecli.views.render import TERMINAL
+from brakecli.views.stability import of_advice
+from brakecli.views.terminal import terminal_text
 from tests.campaign import campaign
 from tests.cli.test_interrupted import interrupt, many_waves
 from tests.commands import ROOT, brakecli, each, left_in, started
@@ -27,7 +29,8 @@ def test_json_has_the_names_of_the_page_and_the_advised_value_keeps_its_promise(
     assert numbers["friction_coefficient"] == 0.7
     assert numbers["margin"] == pytest.approx(0.5753762 / 0.7 - 1.0, abs=1e-6)
     assert numbers["conclusion"].startswith(
-        "squeals at 174.3 Hz; stable up to a friction coefficient of 0.575, 18 % below the case's 0.7; "
+        "squeals at 174.3 Hz; sliding loses its stability from a friction coefficient of 0.575 on, 18 % below the"
+        " case's 0.7; "
     )
     by_key = {each["parameter"]: each for each in numbers["sensitivities"]}
     assert set(by_key["link2.angle_deg"]) >= {"parameter", "value", "elasticity", "derivative"}
@@ -59,15 +62,19 @@ def test_what_takes_long_is_left_out_where_no_more_is_wanted_and_the_run_that_ch
 def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("COLUMNS", "80")
     loaded = parse_case(*read_text(CASES["relaxation"]), ["solver.duration=0.1"])
-    table = advice_table(advise(loaded, KEYS, 0.2, lambda what, done, total: None))
+    report = advise(loaded, KEYS, 0.2, lambda what, done, total: None)
+    table = terminal_text(of_advice(report, TERMINAL), details=True)
     assert max(map(len, table.splitlines())) <= 80
     for words in (
-        "link2.angle_deg    5        7.692      0.84        89.99",
+        "link2.angle_deg    5        7.692      0.84        89.99                damped",
         "no help    -           none in 500 to",
     ):
         assert words in table
-    assert "in a sentence     squeals at 174.3 Hz; stable up to a friction" in table
-    assert "checked by a run  link2.angle_deg = 7.692: " in table
+    assert "\nSqueals at 174.3 Hz; sliding loses its stability" in table
+    assert "\nchecked by a run   link2.angle_deg = 7.692, " in table
+    short = terminal_text(of_advice(report, TERMINAL)).splitlines()
+    assert len(short) <= 12
+    assert short[-5].endswith("(3 of 9; all: --details):")
 
 
 def test_wrong_options_are_told(tmp_path: Path) -> None:

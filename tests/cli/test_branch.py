@@ -144,7 +144,7 @@ def test_the_file_is_drawn_reported_exported_and_compared(here: Path, found: dic
     command("export", "branch.h5", "-o", "b.csv", "--group", "branch_7", cwd=here).told(2, "branch_0, branch_1")
     same = command("diff", "branch.h5", "branch.h5", cwd=here)
     same.told(0)
-    assert "no difference" in same.out
+    assert "No difference" in same.out
     shown = command("branch", "branch.toml", *FRICTION, cwd=here)
     shown.told(0)
     assert "limit cycle" in shown.out

@@ -55,8 +55,8 @@ def test_the_frequency_of_a_run_that_has_not_settled_says_so(here: Path, tmp_pat
     shown = brakecli("run", RELAXATION, *settings, "-o", "short.h5", cwd=tmp_path).out
     numbers = brakecli("classify", "short.h5", "--json", cwd=tmp_path).json
     assert (numbers["regime"], numbers["settled"]) == ("relaxation", 0)
-    tone = f"{numbers['frequency']:.6g}"
-    assert f"{tone} Hz, not settled" in shown
+    assert f"{numbers['frequency']:.4g} Hz, not settled" in shown
+    tone = f"{numbers['frequency']:.5g}"
     (tmp_path / "run.h5").write_bytes((here / "run.h5").read_bytes())
     both = brakecli("classify", "short.h5", "run.h5", cwd=tmp_path).out
     assert f"{tone}, not settled" in both
@@ -70,10 +70,10 @@ def test_a_rough_wheel_is_asked_whether_neighbours_come_together(here: Path) -> 
     said, told, again, listed, none = each(
         here,
         [
-            ["run", rough, "-o", "rough.h5", "--set", "solver.duration=0.5"],
+            ["run", rough, "-o", "rough.h5", "--set", "solver.duration=0.5", "--details"],
             ["run", rough, "-o", "rough.h5", "--set", "solver.duration=0.5", "--force", "--json"],
             ["classify", "rough.h5", "--json"],
-            ["classify", "rough.h5"],
+            ["classify", "rough.h5", "--details"],
             ["run", smooth, "-o", "smooth.h5", "--set", "solver.duration=0.1", "--json"],
         ],
     )
@@ -275,7 +275,7 @@ def test_stability_and_advise_name_both_thresholds_as_branch_does(here: Path) ->
     table, stable, advised, branch = each(
         here,
         [
-            ["stability", "branch.toml"],
+            ["stability", "branch.toml", "--details"],
             ["stability", "branch.toml", "--json"],
             ["advise", "branch.toml", "--json"],
             ["branch", "branch.toml", *along, "--json"],
@@ -291,7 +291,7 @@ def test_stability_and_advise_name_both_thresholds_as_branch_does(here: Path) ->
     assert (stable.json["pushes"], branch.json["pushes"]) == (640, 640)
     assert words in advised.json["conclusion"]
     assert words in " ".join(table.out.split())
-    assert re.search(r"search for other vibrations +\d+\.\d s, 640 pushes\n", table.out)
+    assert re.search(r"search for other vibrations +640 pushes\n", table.out)
     assert "pushes" not in advised.out
 
 

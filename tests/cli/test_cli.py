@@ -160,9 +160,10 @@ def test_a_case_from_standard_input_is_written_to_case_h5(folder: Path, tiny: Do
 
 
 def test_the_table_names_what_was_found_and_quiet_prints_nothing(folder: Path) -> None:
-    loud, quiet = each(folder, [["run", "tiny.toml", "-o", f"t{n}.h5", *f] for n, f in enumerate(([], ["-q"]))])
+    ways = enumerate((["--details"], ["-q"]))
+    loud, quiet = each(folder, [["run", "tiny.toml", "-o", f"t{n}.h5", *way] for n, way in ways])
     assert loud.told(0) == quiet.told(0) == ""
-    for word in ("regime", "because", "frequency", "friction force", "energy account", "t0.h5", "2000 of 1e-05 s"):
+    for word in ("regime", "undecided", "growing", "friction force", "energy account", "t0.h5", "2000 of 1e-05 s"):
         assert word in loud.out
     assert ESCAPE not in loud.out
     assert quiet.out == ""
@@ -249,7 +250,7 @@ def test_check_reports_cost_and_limits_and_writes_nothing(tmp_path: Path) -> Non
     (tmp_path / "tiny.toml").write_text(TINY)
     table, numbers, quiet = each(tmp_path, [["check", "tiny.toml", *flag] for flag in ([], ["--json"], ["-q"])])
     assert table.told(0) == numbers.told(0) == quiet.told(0) == quiet.out == ""
-    for word in ("surface speed U", "0.05 m/s", "natural frequencies", "2000 steps", "MB", "closed-form"):
+    for word in ("surface speed U", "50 mm/s", "natural frequencies", "2000 steps", "MB", "closed-form"):
         assert word in table.out
     assert numbers.json["valid"] is True
     assert numbers.json["steps"] == 2000
@@ -285,7 +286,7 @@ def test_the_citation_has_version_and_year_and_says_what_its_file_says() -> None
 def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
     listed = brakecli("--help", cwd=ROOT)
     listed.told(0)
-    commands = re.findall(r"^  ([a-z-]+)  ", listed.out.split("Commands:")[1], re.MULTILINE)
+    commands = re.findall(r"^  ([a-z-]+)  ", listed.out.split("Ask:")[1], re.MULTILINE)
     assert set(COMMANDS) <= set(commands)
     pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md")]
     documentation = "\n".join(page.read_text(encoding="utf-8") for page in pages)
@@ -332,7 +333,7 @@ def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> Non
 def test_a_run_that_keeps_a_tolerance_tells_the_step_that_it_took(tmp_path: Path) -> None:
     """So many steps of that length are the duration; the case gives none."""
     case = TINY.replace("{ step = 1e-5, duration", '{ scheme = "two-layer", tolerance = 1e-4, duration')
-    done = brakecli("run", "-", cwd=tmp_path, stdin=case)
+    done = brakecli("run", "-", "--details", cwd=tmp_path, stdin=case)
     found = re.search(r"steps +(\d+) of (\S+) s,", done.out)
     assert found is not None, done
     assert int(found[1]) * float(found[2]) == pytest.approx(0.02, rel=1e-3)

@@ -19,6 +19,7 @@ from brakecli.files.contents import INFO, Difference, difference
 from brakecli.files.read import open_result
 from brakecli.plots import two
 from brakecli.runs.run import run
+from brakecli.views.view import sentence
 from tests.campaign import campaign
 from tests.commands import TINY, attributes, brakecli, each, left_in
 from tests.sweeps.made_up import CYCLE, DAMPED, swept
@@ -308,7 +309,7 @@ def test_a_result_is_the_same_as_itself_and_as_its_repetition(folder: Path, tmp_
         assert found.code == 0
         assert found.json["same"] is True
         assert [found.json[name] for name in ("case", "numbers", "variables", "versions")] == [[]] * 4
-    assert "no difference" in brakecli("diff", folder / "a.h5", folder / "a.h5", cwd=tmp_path).out
+    assert "No difference" in brakecli("diff", folder / "a.h5", folder / "a.h5", cwd=tmp_path).out
 
 
 def test_a_sentence_says_what_differs_in_lines_of_eighty_columns(folder: Path) -> None:
@@ -319,10 +320,10 @@ def test_a_sentence_says_what_differs_in_lines_of_eighty_columns(folder: Path) -
     most = max(
         (each["relative"], each["name"], each["largest"]) for each in found["variables"] if each["relative"]
     )
-    assert head == found["sentence"]
+    assert head == sentence(found["sentence"])
     regimes = [attributes(folder / name)["regime"] for name in ("a.h5", "b.h5")]
     same = "is the same" if regimes[0] == regimes[1] else f"differs: {' and '.join(regimes)}"
-    assert head.startswith(f"the case differs in friction.coefficient; the verdict {same}; {most[1]} differs most")
+    assert head.startswith(f"The case differs in friction.coefficient; the verdict {same}; {most[1]} differs most")
     assert f"{most[2]:.3g}" in head
     assert f"{most[0]:.3g} times its largest value" in head
 
@@ -417,7 +418,7 @@ def test_samples_are_compared_at_the_same_time_and_lines_at_the_same_frequency(
         assert variables["spectrum", "vx"]["interpolated"] == "frequency"
     numbers = {each["name"]: each.get("units") for each in found["numbers"]}
     assert numbers["amplitude"] == "m"
-    shown = " ".join(brakecli("diff", fine, coarse, cwd=folder).out.split())
+    shown = " ".join(brakecli("diff", fine, coarse, "--details", cwd=folder).out.split())
     assert "compared at equal time and frequency; the finer result is interpolated" in shown
     table, same, lengths = shown.partition("the same where both have values, of different lengths: ")
     assert same

@@ -17,9 +17,11 @@ import pytest
 from brakecli.case.read import parse_case, starters
 from brakecli.cli.app import app
 from brakecli.front import progress
-from brakecli.front.tables import grid, verdict_table
 from brakecli.scattering.study import parse_study
 from brakecli.sweeps.plan import parse_sweep
+from brakecli.views.motion import of_verdict
+from brakecli.views.render import TERMINAL
+from brakecli.views.terminal import grid, terminal_text
 from tests.campaign import campaign
 from tests.commands import COMMAND, LONG, ROOT, TINY, attributes, brakecli, each, environment, left_in
 
@@ -73,11 +75,18 @@ def test_evidence_has_the_units_of_the_page() -> None:
         "evidence": dict.fromkeys(units, 2.5),
     }
     numbers["evidence"]["line_frequencies"] = [100.0, 200.0]
-    shown = dict(re.split("  +", line, maxsplit=1) for line in verdict_table("f.h5", numbers).splitlines()[1:])
-    assert shown["line frequencies"] == "100, 200 Hz"
+    shown = evidence(numbers)
+    assert shown["line frequencies"] == "100 Hz, 200 Hz"
     for name, unit in units.items():
         if name != "line_frequencies":
             assert shown[name.replace("_", " ")] == f"2.5 {'' if unit == '1' else unit}".rstrip(), name
+
+
+def evidence(numbers: dict[str, Any]) -> dict[str, str]:
+    """The rows of a verdict's evidence on a terminal."""
+    text = terminal_text(of_verdict(numbers, "f.h5", TERMINAL), details=True)
+    rows = [re.split("  +", line, maxsplit=1) for line in text.splitlines()]
+    return {row[0]: row[1] for row in rows if len(row) == 2}
 
 
 def test_the_noise_of_an_acceleration_is_that_of_the_velocity_by_which_it_is_judged() -> None:
@@ -86,8 +95,7 @@ def test_the_noise_of_an_acceleration_is_that_of_the_velocity_by_which_it_is_jud
             ("frequency", "amplitude", "stick_fraction", "contact_loss_fraction")
         )
         numbers |= {"regime": "damped", "excitation": "none", "reasons": ["so it is"], "evidence": {"noise": 2.5}}
-        last = verdict_table("f.csv", numbers | {"quantity": quantity}).splitlines()[-1]
-        assert last.split(maxsplit=1) == ["noise", f"2.5 {unit}"]
+        assert evidence(numbers | {"quantity": quantity})["noise"] == f"2.5 {unit}"
 
 
 def test_a_terminal_gets_messages_without_a_broken_word_and_a_file_gets_them_in_one_line(

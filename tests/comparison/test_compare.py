@@ -33,9 +33,9 @@ from brakecli.comparison.methods import (
 )
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UsageError
-from brakecli.front.tables import comparison_table
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import NUMEROV, QUARTERS, SCHEMES, load
+from brakecli.views.points import of_comparison
 from tests.campaign import campaign
 from tests.commands import ROOT, TINY, attributes, brakecli, left_in
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
@@ -327,7 +327,8 @@ def test_an_error_that_is_low_by_chance_is_told() -> None:
     lucky = replace(coarsest, errors=replace(coarsest.errors, error=target / 2.0))
     for entries, told in (((lucky, *finer), True), ((lucky,), False)):
         chosen = replace(found, entries=entries, reference_error=0.0)
-        assert ("by chance" in comparison_table(ComparisonReport(Path("x.h5"), smooth(), chosen, target))) == told
+        answer = of_comparison(ComparisonReport(Path("x.h5"), smooth(), chosen, target)).answer
+        assert ("by chance" in answer[-1]) == told
 
 
 @pytest.mark.parametrize("base", [SQUEAL, ROUGH], ids=["smooth", "rough"])

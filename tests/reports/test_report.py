@@ -35,6 +35,8 @@ from brakecli.runs.run import run
 from brakecli.sweeps.lock_in import lock_in
 from brakecli.sweeps.lock_in import write as write_lock_in
 from brakecli.sweeps.tables import Axis
+from brakecli.views.motion import reasons_of
+from brakecli.views.view import sentences
 from tests.campaign import campaign
 from tests.commands import ROOT, TINY
 from tests.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
@@ -191,9 +193,9 @@ def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
 
 def test_keys_keep_their_spelling_and_lengths_have_a_prefix() -> None:
     lines = ["solver.duration: settled after 0.1 s", "the pad opens"]
-    assert of_run._sentences("", lines) == ["solver.duration: settled after 0.1 s.", "The pad opens."]
+    assert sentences(lines) == ["solver.duration: settled after 0.1 s.", "The pad opens."]
     found = {"reasons": ["it comes to an amplitude of 8.71e-05 m at 0.05 m/s"]}
-    assert of_run._reasons(found) == ["it comes to an amplitude of 87.1\u00a0µm at 0.05 m/s"]
+    assert reasons_of(found, blocks.PAGE) == ["it comes to an amplitude of 87.1\u00a0µm at 0.05 m/s"]
 
 
 def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_not_see_it(found: Page) -> None:
@@ -207,7 +209,10 @@ def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_n
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ("friction.coefficient=0.3", "Nothing has to be changed; stable up to a friction coefficient of 0.575"),
+        (
+            "friction.coefficient=0.3",
+            "Nothing has to be changed; does not squeal by itself; sliding loses",
+        ),
         ("wheel.angular_speed=0.0", "No change is known; the wheel stands"),
     ],
 )

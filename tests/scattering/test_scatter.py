@@ -268,7 +268,7 @@ def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
         for name in ("first_order", "total", "total_error"):
             assert told[name] == dict(zip(keys, result.read("/", name).tolist(), strict=True))
         assert result.attributes["sentence"] == told["sentence"]
-    shown = command("scatter", "study.toml", "--force", cwd=tmp_path).out
+    shown = command("scatter", "study.toml", "--force", "--details", cwd=tmp_path).out
     assert "critical friction below the brake's own" in shown
     assert "What decides on critical friction" in shown
 
@@ -285,7 +285,7 @@ def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> N
         assert text in page
     command("scatter", "scatter.toml", *few, "--set", 'indices_of="none"', "-q", "--force", cwd=tmp_path)
     command("plot", "scatter.h5", "--force", cwd=tmp_path)
-    assert "no difference" in command("diff", "scatter.h5", "scatter.h5", cwd=tmp_path).out
+    assert "No difference" in command("diff", "scatter.h5", "scatter.h5", cwd=tmp_path).out
     assert command("export", "scatter.h5", "-o", "s.csv", cwd=tmp_path).out
     assert (tmp_path / "s.csv").read_text().startswith("sample,")
 

@@ -16,10 +16,12 @@ import brakecli
 from brakecli.case.read import starters
 from brakecli.errors import UnreadableResultError
 from brakecli.files.read import open_result
-from brakecli.front.tables import sweep_table
 from brakecli.sweeps.plan import LoadedSweep, parse_sweep
 from brakecli.sweeps.result import SweepReport
 from brakecli.sweeps.workers.task import compute_units
+from brakecli.views.points import of_sweep
+from brakecli.views.render import TERMINAL
+from brakecli.views.terminal import terminal_text
 from tests.branches.smooth_shoes import FRICTION, followed
 from tests.campaign import campaign
 from tests.sweeps.helpers import axis, inline, interrupted, write_sweep
@@ -141,7 +143,9 @@ def test_points_that_are_not_decided_have_no_attractor_and_widen_the_shares(tmp_
 
     assert tuple(sliding.share) == pytest.approx((6 / 11, ends(6)[0], ends(9)[1]), rel=1e-9)
     assert tuple(cycle.share) == pytest.approx((2 / 11, ends(2)[0], ends(5)[1]), rel=1e-9)
-    assert "attractor  regime      Hz   amplitude of x, m  share  95 % interval" in sweep_table(report)
+    assert "attractor  regime      Hz   amplitude of x, m  share  95 % interval" in terminal_text(
+        of_sweep(report, TERMINAL)
+    )
 
 
 def test_motions_without_a_gap_between_them_are_told(tmp_path: Path) -> None:

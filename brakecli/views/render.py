@@ -1,5 +1,6 @@
 """How people read the values of a result: one way for terminal, Python and pages; each has its form of numbers."""
 
+import math
 import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -9,6 +10,9 @@ from typing import Any
 from brakecli.files.field import Field, plain_units
 
 _UNSAID = ("1", "of the key")  # units that no reader needs
+_PREFIXES = ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p"))
+_SMALL = 5e-4
+"""Error over the value below which it cannot be seen beside four digits: half a unit of the last one of 1.000."""
 
 
 @dataclass(frozen=True)
@@ -40,8 +44,16 @@ class Renderer:
         if value is not None and field.is_flag:
             return self.text(bool(value))
         if value is not None and field.is_part_of_time:
-            return f"{value:.2%} of the time"
+            return f"{100.0 * value:.3g} % of the time"
         return self.text(value, field.units)
+
+    def with_error(self, value: float | None, error: float | None, units: str = "") -> str:
+        """A value with its error, where that can be seen; two digits of the error tell those of the value."""
+        if value is None or not error or not error > _SMALL * abs(value):
+            return self.text(value, units)
+        factor, unit = prefixed(max(abs(value), error), units)
+        places = max(0, 1 - math.floor(math.log10(factor * error)))
+        return f"{factor * value:.{places}f} ± {factor * error:.{places}f} {unit}".rstrip()
 
     def rows(self, known: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         """Title, value and meaning of each field that has a value."""
@@ -52,13 +64,37 @@ class Renderer:
         ]
 
 
+def prefixed(magnitude: float, unit: str) -> tuple[float, str]:
+    """The factor for values up to this magnitude that makes them easy to read, and the unit with its SI prefix.
+
+    Prefixes are those that engineers use: no km/s, kHz from ten of them on, none for angles and pure numbers.
+    """
+    large = (unit == "Hz" and magnitude >= 1e4) or unit[:1] in "NJWP"
+    small = unit in ("m", "m/s", "m/s²", "s") or unit[:1] in "NJWP"
+    for exponent, prefix in _PREFIXES:
+        wanted = unit and (large if exponent > 0 else small or exponent == 0)
+        if wanted and 10.0**exponent <= magnitude < 1e12:
+            return 10.0**-exponent, prefix + unit
+    return 1.0, unit
+
+
+def _prefixed_text(digits: int, value: Any, units: str) -> str:
+    if isinstance(value, int):
+        return f"{value} {units}".rstrip()
+    factor, units = prefixed(abs(float(value)), units)
+    return f"{factor * float(value) + 0.0:.{digits}g} {units}".rstrip()
+
+
 def _written(form: str, value: Any, units: str) -> str:
     return f"{value:{form}} {units}".rstrip()
 
 
-TERMINAL = Renderer(partial(_written, ".6g"))
+TERMINAL = Renderer(partial(_prefixed_text, 4), each=True)
+"""Four digits: the numbers of a brake are known to per cents."""
+EXACT = Renderer(partial(_prefixed_text, 7), each=True)
+"""What a terminal writes where all is asked for."""
 
 
 def text_of(value: Any, units: str = "", form: str = ".6g") -> str:
-    """A value with its unit for the terminal, its numbers in some form."""
+    """A value with its unit, its numbers in some form."""
     return Renderer(partial(_written, form)).text(value, units)

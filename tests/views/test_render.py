@@ -7,8 +7,8 @@ import pytest
 from brakecli.files import fields
 from brakecli.files.field import Field, integer, ratio
 from brakecli.files.stability_fields import SCATTER
-from brakecli.front.render import TERMINAL, text_of
 from brakecli.reports.blocks import PAGE
+from brakecli.views.render import TERMINAL, text_of
 
 FLAG = integer("settled", "whether it has settled (0, 1)")
 SHARE = ratio("stick", "part of the time in stick")
@@ -21,11 +21,11 @@ LENGTH = Field("amplitude", "m", "amplitude of x")
         (FLAG, 1, "yes", "yes"),
         (FLAG, 0, "no", "no"),
         (FLAG, None, "-", "–"),
-        (SHARE, 0.25, "25.00% of the time", "25.00% of the time"),
+        (SHARE, 0.25, "25 % of the time", "25 % of the time"),
         (SHARE, None, "-", "–"),
-        (LENGTH, 2.5e-6, "2.5e-06 m", "2.5\u00a0µm"),
+        (LENGTH, 2.5e-6, "2.5 µm", "2.5\u00a0µm"),
         (LENGTH, None, "-", "–"),
-        (LENGTH, [1e-6, 2e-3], "1e-06, 0.002 m", "1\u00a0µm, 2\u00a0mm"),
+        (LENGTH, [1e-6, 2e-3], "1 µm, 2 mm", "1\u00a0µm, 2\u00a0mm"),
         (LENGTH, [], "-", "–"),
         (Field("regime", "", "what it is"), "damped", "damped", "damped"),
         (Field("counts", "", "how many"), {"stick": 2}, "stick 2", "stick 2"),
@@ -52,7 +52,7 @@ def test_every_declared_part_of_the_time_and_flag_is_read_as_such() -> None:
         if "(0, 1)" in each.meaning:
             assert TERMINAL.field(each, 1) == "yes", each.name
         if each.name in ("stick_fraction", "contact_loss_fraction"):
-            assert TERMINAL.field(each, 0.5) == "50.00% of the time", each.name
+            assert TERMINAL.field(each, 0.5) == "50 % of the time", each.name
 
 
 def test_numbers_of_the_terminal_have_the_form_that_is_asked_for() -> None:

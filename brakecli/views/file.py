@@ -1,0 +1,155 @@
+"""Views of files: what a case asks for, what a result holds, and how two results differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from brakecli.errors import value_text
+from brakecli.solver.quantities import COEFFICIENTS
+from brakecli.views.render import Renderer, text_of
+from brakecli.views.view import Row, Table, View, sentence
+
+if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
+    from brakecli.runs.limits import Check
+    from brakecli.sweeps.cost import Estimate
+
+_ASIDE = ("title", "regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
+_MAIN = ("regime", "frequency", "amplitude", "excitation", "stick_fraction", "contact_loss_fraction", "critical")
+"""Numbers that come first."""
+SHORT = 2
+"""Keys of the case of which a short answer says how they differ, and one number more."""
+
+
+def of_check(found: Check, title: str, show: Renderer) -> View:
+    """What a run would take and which limits it meets."""
+    system = found.system
+    limits = found.limits
+    has_step = found.step is not None
+    low, high = system.natural_frequencies
+    link_low, link_high = found.link_frequencies
+    coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
+    rows = [
+        *(
+            Row(f"{c.symbol}, {c.long_name}", show.text(value, c.units.removeprefix("1")))
+            for c, value in coefficients
+        ),
+        Row("surface speed U", show.text(system.belt_speed, "m/s")),
+        Row("contact stiffness 2ak", show.text(system.contact_stiffness, "N/m")),
+        Row("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
+        Row("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
+        Row("shortest wave passes at", show.text(system.passing_frequency or None, "Hz")),
+        Row("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps:.15g} steps"),
+    ]
+    if has_step:
+        rows += [
+            Row("steps per period", f"{found.steps_per_period:.4g} of the fastest motion"),
+            Row("fixed-point contraction", f"{limits.contraction:.3g} (1 or more: it may diverge)"),
+            Row("solution of each step", "unique" if limits.unique else "perhaps not unique"),
+            Row("scheme", f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"),
+        ]
+    rows += [
+        Row("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
+        Row("nodes per shortest wave", show.text(found.nodes_per_wave)),
+        *_cost_rows(found),
+        *(Row("adjusted", each) for each in found.adjustments),
+    ]
+    return View(title, blocks=rows)
+
+
+def of_estimate(found: Estimate, title: str) -> View:
+    """What a sweep would take."""
+    workers = str(found.workers or "none, as they would take longer to start")
+    return View(title, blocks=[Row("points", str(found.points)), Row("workers", workers), *_cost_rows(found)])
+
+
+def _cost_rows(found: Check | Estimate) -> list[Row]:
+    from brakecli.runs.cost import duration_text
+
+    return [
+        Row("time", f"{'at least' if found.at_least else 'about'} {duration_text(found.seconds)}"),
+        Row("memory", f"about {found.memory / 1e6:.0f} MB"),
+        Row("file", f"about {found.file_size / 1e6:.2g} MB"),
+    ]
+
+
+def of_info(numbers: Mapping[str, Any]) -> View:
+    """Contents of a file, a row for each group of variables."""
+    groups: dict[str, list[str]] = {}
+    for each in numbers["variables"]:
+        sizes = " x ".join(f"{name} {size}" for name, size in zip(each["dims"], each["shape"], strict=True))
+        groups.setdefault(f"{each['group']}: {sizes}", []).append(each["name"])
+    changed = "unchecked: no digest vouches for its bytes"
+    made = ", ".join(f"{name} {version}" for name, version in numbers["versions"].items())
+    rows = [
+        Row("kind", str(numbers["kind"]) + (f", {numbers['status']}" if numbers["status"] else "")),
+        Row("title", numbers["title"] or "-"),
+        Row("whole", "yes, every byte is as it was written" if numbers["whole"] else changed),
+        Row("size", f"{numbers['bytes'] / 1e6:.3g} MB"),
+        Row("made by", made),
+        *(Row(where, ", ".join(names)) for where, names in groups.items()),
+    ]
+    return View(numbers["file"], blocks=rows)
+
+
+def of_difference(numbers: Mapping[str, Any], files: Mapping[str, str], show: Renderer) -> View:
+    """What differs in a sentence; the main keys and numbers, and on demand all, each side by side."""
+    blocks: list[Row | Table] = []
+    for part, shown in (("case", SHORT), ("numbers", SHORT + 1), ("versions", 0)):
+        rows = [each for each in numbers[part] if not each["name"].startswith(_ASIDE)]
+        rows.sort(key=lambda each: _MAIN.index(each["name"]) if each["name"] in _MAIN else len(_MAIN))
+        if rows:
+            blocks.append(_sides(part, rows, files, show, shown))
+        if more := sum(each["name"] != "title" for each in numbers[part]) - len(rows):
+            what = f"{more} more with reasons and evidence differ; --json lists them"
+            blocks.append(Row(part, what, detail=True))
+    alike = [each for each in numbers["variables"] if each["compared"] and not each["different"]]
+    variables = [each for each in numbers["variables"] if each not in alike]
+    if variables:
+        columns = {
+            "variable": [_place(each) for each in variables],
+            "differ": [f"{each['different']} of {each['compared']}" for each in variables],
+            "by at most": [text_of(each["largest"], each["units"], ".3g") for each in variables],
+            "of the largest": [text_of(each["relative"], form=".2%") for each in variables],
+            "shapes": [_shapes(each) for each in variables],
+        }
+        if all(each["shapes"][0] == each["shapes"][1] for each in variables):
+            del columns["shapes"]
+        blocks.append(Table(columns, first=0))
+    if alike:
+        named = ", ".join(f"{_place(each)} ({_shapes(each)})" for each in alike)
+        blocks.append(Row("alike", f"the same where both have values, of different lengths: {named}", detail=True))
+    if along := {each["interpolated"]: None for each in numbers["variables"] if each["interpolated"]}:
+        how = f"compared at equal {' and '.join(along)}; the finer result is interpolated"
+        blocks.append(Row("places", how, detail=True))
+    if files["output"]:
+        blocks.append(Row("written", files["output"]))
+    return View("", [sentence(numbers["sentence"])], blocks)
+
+
+def _sides(
+    what: str, rows: list[Mapping[str, Any]], files: Mapping[str, str], show: Renderer, first: int
+) -> Table:
+    """Names, and the values of both files."""
+    columns = {what: [each["name"] for each in rows]}
+    for side in ("a", "b"):
+        columns[files[side]] = [_value(each[side], each.get("units"), show) for each in rows]
+    return Table(columns, first=first)
+
+
+def _value(value: Any, units: str | None, show: Renderer) -> str:
+    if isinstance(value, float) or value is None:
+        return show.text(value, units or "")
+    return value_text(value).strip('"')
+
+
+def _place(variable: Mapping[str, Any]) -> str:
+    return f"{variable['group']}/{variable['name']}".replace("//", "")
+
+
+def _shapes(variable: Mapping[str, Any]) -> str:
+    return " and ".join(map(_shape, variable["shapes"]))
+
+
+def _shape(shape: Any) -> str:
+    return "-" if shape is None else " x ".join(map(str, shape))

@@ -1,0 +1,226 @@
+"""Views of many runs: of a sweep, and of a comparison of schemes."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from itertools import groupby
+from operator import itemgetter
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from brakecli.analysis.regime.decision import Regime
+from brakecli.faces import argument
+from brakecli.files import fields
+from brakecli.files.field import Field, named, values_of
+from brakecli.views.render import Renderer, text_of
+from brakecli.views.view import Row, Table, View, details, sentences
+
+if TYPE_CHECKING:
+    from brakecli.comparison.result import ComparisonReport
+    from brakecli.sweeps.attractors import Attractor
+    from brakecli.sweeps.result import SweepReport
+
+POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
+CRITICAL = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, "critical", "critical_error"))
+SEARCHES = named(fields.CRITICAL, "critical_eigenvalue", "critical_sustained", "critical_status")
+"""What a search says beside its value, shown where it says something else."""
+SHORT_POINTS = 6
+"""Points that are listed unless all are asked for: a short answer has twelve lines."""
+MOST_LISTED_POINTS = 200
+MOST_STRETCHES = 6
+"""Stretches of equal regimes along an axis that a row lists."""
+ENTRIES = (
+    ("method", "method", ""),
+    ("step", "step, s", ".3g"),
+    ("error", "error", ".2e"),
+    ("observed_order", "order", ".2f"),
+    ("critical_bias", "bias of φ", ".1e"),
+    ("contact_evaluations", "evaluations", "d"),
+    ("milliseconds", "time, ms", ".3g"),
+)
+"""Of the methods that are compared: name of the numbers, header, format."""
+
+
+def of_sweep(report: SweepReport, show: Renderer) -> View:
+    """What the points of a sweep come to, where that changes, and every point of a small one."""
+    found = report.findings
+    blocks: list[Row | Table] = []
+    if found.points <= MOST_LISTED_POINTS:
+        blocks.append(_points(report, show))
+    if found.attractors:
+        blocks.append(_attractors(found.attractors))
+    blocks += _stretches(report)
+    blocks += [Row("note", each) for each in found.sentences]
+    if found.failed:
+        blocks.append(Row("failed", f"{found.failed} points"))
+    speed = report.points_per_second
+    cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the time not on points" if speed else ""
+    resumed = f", {report.resumed} of them computed before" if report.resumed else ""
+    hidden = f"; listed with {argument('details')}" * (SHORT_POINTS < found.points <= MOST_LISTED_POINTS)
+    blocks.append(Row("points", f"{found.points}{resumed}{hidden}"))
+    blocks += details(Row("time", text_of(report.seconds, "s", ".3g") + cost))
+    blocks.append(Row("file", str(report.output)))
+    return View(report.loaded.title, sentences(_answer(report, show)), blocks)
+
+
+def regimes_sentence(regimes: Mapping[str, int], size: int) -> str:
+    """At how many points it vibrates, and the regimes of all."""
+    lasting = sum(regimes.get(each, 0) for each in (Regime.RELAXATION, Regime.QUASI_HARMONIC))
+    each = ", ".join(f"{name} at {count}" for name, count in regimes.items() if name)
+    return f"it vibrates at {lasting} of {size} points: {each}"
+
+
+def _answer(report: SweepReport, show: Renderer) -> list[str]:
+    """What the points say as a whole."""
+    found = report.findings
+    sought = report.loaded.sweep.critical
+    if sought is None or found.critical is None:
+        return [regimes_sentence(found.regimes, found.points)]
+    if found.points == 1 and (said := [each for each in (found.variables or {})["critical_sentence"] if each]):
+        return [str(said[0])]
+    count, least, largest = found.critical
+    span = ""
+    if count > 1:
+        span = f", from {show.text(least)}{_where(report, least)} to {show.text(largest)}{_where(report, largest)}"
+    elif count:
+        span = f": {show.text(least)}{_where(report, least)}"
+    return [f"a critical {sought.parameter} is found at {count} of {found.points} points{span}"]
+
+
+def _where(report: SweepReport, critical: float) -> str:
+    """The first point that has a critical value, in words; empty where the points are too many."""
+    from brakecli.sweeps.plan import label
+
+    variables = report.findings.variables
+    plan = report.loaded.plan
+    if variables is None:
+        return ""
+    values = np.ravel(np.array(variables["critical"], float))
+    settings = plan.settings(int(np.flatnonzero(values == critical)[0]) % plan.points)
+    where = ", ".join(f"{'.'.join(path)} = {label(value)}" for path, value in settings.items())
+    return f" at {where}" if where else ""
+
+
+def _stretches(report: SweepReport) -> list[Row]:
+    """Along a single axis: the stretches of equal regimes, where the points are too many to be listed."""
+    from brakecli.sweeps.plan import label
+
+    found = report.findings
+    axes = report.loaded.plan.sweep.axis
+    both_ways = "direction" in found.dimensions  # of which hysteresis is said
+    if (
+        len(axes) != 1
+        or both_ways
+        or found.variables is None
+        or found.critical is not None
+        or found.points <= SHORT_POINTS
+    ):
+        return []
+    regimes = np.ravel(np.array(found.variables["regime"], object)).tolist()
+    values = [label(axes[0].value(place)) for place in range(axes[0].size)]
+    parts = []
+    for regime, stretch in groupby(zip(regimes, values, strict=True), key=itemgetter(0)):
+        ends = [value for _, value in stretch]
+        span = dict.fromkeys([ends[0], ends[-1]])
+        parts.append(f"{regime or 'failed'} {'at' if len(span) == 1 else 'from'} {' to '.join(span)}")
+    return [Row(axes[0].parameter[0], ", ".join(parts))] if len(parts) <= MOST_STRETCHES else []
+
+
+def _points(report: SweepReport, show: Renderer) -> Table:
+    """A row for each point: its place on the axes, and what was found there."""
+    from brakecli.sweeps.plan import label
+
+    found = report.findings
+    plan = report.loaded.plan
+    variables = found.variables or {}
+    places = [plan.places(point % plan.points) for point in range(found.points)]
+    columns: dict[str, list[str]] = {}
+    if "direction" in found.dimensions:
+        columns["way"] = [("up", "down")[point // plan.points] for point in range(found.points)]
+    for number, axis in enumerate(plan.sweep.axis):
+        columns[axis.parameter[0]] = [label(axis.value(place[number])) for place in places]
+    if plan.listed is not None:
+        for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True):
+            columns[key] = [label(each) for each in column]
+    keys = len(columns)
+    known = POINTS
+    if found.critical is not None:
+        known = (*CRITICAL, *(each for each in SEARCHES if _says_more(each, variables)))
+    if found.attractors is not None:
+        known += fields.STARTS
+    for field in known:
+        values = np.ravel(np.array(variables[field.name], object))
+        header = f"{field.title}, {field.units}" if field.units.strip("1") else field.title
+        is_error = field.title == "±"
+        columns[header] = [text_of(value, form=".2g") if is_error else show.text(value) for value in values]
+    return Table(columns, keys=max(keys, 1), first=None if found.points <= SHORT_POINTS else 0)
+
+
+def _says_more(field: Field, variables: Mapping[str, Any]) -> bool:
+    """Whether a number of a search differs from the critical value by more than that one's error."""
+    values = np.ravel(np.array(variables[field.name], object))
+    if field.name == "critical_status":
+        return bool((values != "found").any())
+    critical, error = (np.ravel(np.array(variables[name], float)) for name in ("critical", "critical_error"))
+    other = values.astype(float)
+    differs = np.abs(other - critical) > np.maximum(np.nan_to_num(error), 1e-4 * np.abs(critical))
+    return bool((differs | (np.isnan(other) != np.isnan(critical))).any())
+
+
+def _attractors(found: Iterable[Attractor]) -> Table:
+    """What the points of a sweep over initial states come to."""
+    each = [values_of(fields.ATTRACTOR, one) for one in found]
+    columns = {
+        "attractor": [str(one["attractor"]) for one in each],
+        "regime": [one["regime"] for one in each],
+        "Hz": [text_of(one["frequency"], form=".4g") for one in each],
+        "amplitude of x, m": [text_of(one["amplitude"], form=".4g") for one in each],
+        "share": [f"{one['share']:.1%}" for one in each],
+        "95 % interval": [f"{one['share_lower']:.1%} to {one['share_upper']:.1%}" for one in each],
+    }
+    return Table(columns)
+
+
+def of_comparison(report: ComparisonReport) -> View:
+    """What is recommended, the entries that no other beats, and on demand the finest of each other method."""
+    found = report.comparison
+    best = report.recommended
+    entries = list(zip(found.entries, report.numbers()["entries"], strict=True))
+    for _, numbers in entries:
+        numbers["milliseconds"] = 1e3 * (numbers["wall_seconds"] or 0.0)
+        numbers["step"] = numbers["step"] or (f"to {numbers['tolerance']:g}" if numbers["tolerance"] else "exact")
+    able = [(entry, numbers) for entry, numbers in entries if entry.errors is not None]
+    front = sorted((numbers for entry, numbers in able if entry.on_front), key=lambda each: each["milliseconds"])
+    finest = {entry.kind: numbers for entry, numbers in able if not entry.on_front}
+    failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
+    answer = [f"no method meets the wanted error of {report.target:g}"]
+    if best is not None:
+        answer = [f"recommended is {best}: its error is {best.error:.2g}, and {report.target:g} is the target"]
+        if (finer := found.finer_error(best)) > report.target:
+            chance = f"this is by chance: at a finer step its error is {finer:.2g}"
+            answer.append(f"{chance}; choose a method with more margin")
+    blocks: list[Row | Table] = []
+    if report.in_a_case:
+        keys = ", ".join(f"{key} = {json.dumps(each)}" for key, each in report.in_a_case.items())
+        blocks.append(Row("in a case", keys))
+    blocks += [Row("failed", f"{len(failed)} entries, such as {each}: {each.failure}") for each in failed[:1]]
+    if found.left_out:
+        left_out = f"{found.left_out} entries, because the time was used up; give a larger --budget"
+        blocks.append(Row("left out", left_out))
+    blocks.append(Row("file", str(report.output)))
+    times = f"median of {found.repeats} repetitions," if found.repeats > 1 else "measured once,"
+    reference = f"event-driven, error below {found.reference_error:.1e}, {found.reference_seconds:.3g} s"
+    blocks += details(
+        Row("compared over", f"{found.duration:.6g} s of motion"),
+        Row("reference", reference),
+        Row("times", f"{times} of the time loop alone"),
+    )
+    blocks.append(Table(_entries(front), "No other has a smaller error in less time"))
+    blocks.append(Table(_entries(finest.values()), "The finest of the others", first=0))
+    return View(report.title, sentences(answer), blocks)
+
+
+def _entries(records: Collection[Mapping[str, Any]]) -> dict[str, Sequence[str]]:
+    return {header: [text_of(each[name], form=form) for each in records] for name, header, form in ENTRIES}

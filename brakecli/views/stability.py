@@ -1,0 +1,288 @@
+"""Views of what `stability`, `advise`, `branch` and `scatter` have found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+from brakecli.analysis.stability.advice import rounded
+from brakecli.files import stability_fields as fields
+from brakecli.files.field import labelled
+from brakecli.views.render import Renderer, text_of
+from brakecli.views.view import Row, Table, View, details, sentence, sentences
+
+if TYPE_CHECKING:
+    from brakecli.analysis.stability.advice import Change
+    from brakecli.runs.advise import AdviceReport
+
+SHORT_ADVICE = 3
+"""Keys to change that are shown unless all are asked for."""
+SHORT_POINTS = 6
+"""Values along a key that are listed unless all are asked for."""
+_RANKED = "Confirmed by a run, smallest relative change first"
+_RANKED_BY_STUDY = "What leaves least squeal under the study's scatter first"
+_MOVES = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %"
+_STATE = {True: "stable", False: "unstable", None: "-"}
+_MODES = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
+"""Headers, factors and formats of the columns of both modes along a key."""
+
+
+def of_stability(numbers: Mapping[str, Any], title: str, show: Renderer, units: str = "") -> View:
+    """Steady sliding, its modes and both thresholds of friction; below that what there is along a key.
+
+    `numbers` are those of `--json`; `units` those of the key that is varied.
+    """
+    phi = numbers["friction_coefficient"]
+    modes = numbers["modes"]
+    crossings = numbers["crossings"]
+    critical = numbers["critical_friction"]
+    rest = numbers["equilibrium"]
+    answer = [numbers.get("sentence") or _without_loss(numbers), _at_own(numbers, show)]
+    rows = [Row("critical friction", _critical(numbers, show))]
+    others = [_crossing(each, show) for each in crossings if each["friction"] != critical]
+    rows += [Row("also changes at", each) for each in others]
+    if numbers.get("coexists_from") is not None:
+        rows.append(Row("can vibrate from", show.text(numbers["coexists_from"])))
+    if numbers.get("barrier") is not None:
+        rows.append(Row("barrier", show.text(numbers["barrier"], "m")))
+    rows += [Row(f"mode at {show.text(mode['frequency'], 'Hz')}", _mode(mode)) for mode in modes]
+    if rest is not None:
+        sliding = f"y = {show.text(rest['y'] + 0.0, 'm')}, F_y = {show.text(rest['normal_force'], 'N')}"
+        rows.append(
+            Row("steady sliding", f"{sliding}, {100.0 * rest['contact_fraction']:.3g} % of the pad touches")
+        )
+    undamped = {kind: numbers[f"undamped_{kind}_friction"] for kind in ("flutter", "divergence")}
+    known = [f"{kind} at {show.text(friction)}" for kind, friction in undamped.items() if friction is not None]
+    stiffness = show.with_error(numbers["contact_stiffness"], numbers["contact_stiffness_error"], "N/m")
+    shapes = [Row(f"shape at {show.text(mode['frequency'], 'Hz')}", _shape(mode)) for mode in modes]
+    aside = [
+        Row("surface speed U", show.text(numbers["belt_speed"], "m/s")),
+        Row("contact stiffness K", stiffness),
+        Row("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
+        Row(f"at φ = {phi:g}", _STATE[numbers["stable"]]),
+        *shapes,
+    ]
+    if numbers.get("pushes"):
+        aside.append(Row("search for other vibrations", f"{numbers['pushes']} pushes"))
+    found: list[Row | Table] = [*rows, *_scheme(numbers["discrete"], show), *details(*aside)]
+    if numbers.get("output"):
+        found.append(Row("file", numbers["output"]))
+    if numbers.get("vary"):
+        table = _along(numbers["vary"], numbers["parameters"])
+        where = ", ".join(show.text(value, units.removeprefix("1")) for value in numbers["critical_values"])
+        changes = f"changes at {where}" if where else "does not change"
+        answer.append(f"along {', '.join(numbers['parameters'])}, stability {changes}")
+        found.append(table)
+    return View(title, sentences(answer), found)
+
+
+def _without_loss(numbers: Mapping[str, Any]) -> str:
+    """What there is to say where no friction coefficient makes steady sliding unstable."""
+    if numbers["no_equilibrium"]:
+        return f"there is no steady sliding: {numbers['no_equilibrium']}"
+    return "no change of stability by friction is found"
+
+
+def _at_own(numbers: Mapping[str, Any], show: Renderer) -> str:
+    """What the case's own friction coefficient gives."""
+    if not numbers["modes"] or numbers["stable"] is None:
+        return ""
+    first = numbers["modes"][0]
+    growth = f"{'grows' if first['growth'] > 0.0 else 'decays'} at {abs(first['growth']):.4g} 1/s"
+    where = f"at the case's {numbers['friction_coefficient']:g} sliding is {_STATE[numbers['stable']]}"
+    return f"{where}: its least stable mode ({show.text(first['frequency'], 'Hz')}) {growth}"
+
+
+def _mode(mode: Mapping[str, Any]) -> str:
+    motion = f"{'grows' if mode['growth'] > 0.0 else 'decays'} at {abs(mode['growth']):.4g} 1/s"
+    return f"{motion}, damping ratio {mode['damping_ratio']:.3g}"
+
+
+def _shape(mode: Mapping[str, Any]) -> str:
+    if mode["shape"] is None or mode["shape_phase"] is None:
+        return "along y alone"
+    return f"y/x {mode['shape']:.3g} at {round(mode['shape_phase'])}°"
+
+
+def _scheme(discrete: Mapping[str, Any] | None, show: Renderer) -> list[Row]:
+    """What the scheme of a case makes of it at its step."""
+    if discrete is None:
+        return []
+    limit = discrete["step_limit"]
+    friction = discrete["critical_friction"]
+    growth = f"{show.text(discrete['growth'], '1/s')}, a factor {discrete['spectral_radius']:.8g} a step"
+    bias = "" if discrete["bias"] is None else f", {discrete['bias']:+.2g} from the exact one"
+    return details(
+        Row("the scheme's growth", growth),
+        Row("its critical friction", "none" if friction is None else f"{show.text(friction)}{bias}"),
+        Row("its stable steps", "any" if limit is None else f"up to {limit:.4g} s" if limit else "none"),
+    )
+
+
+def _along(entries: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> Table:
+    """Critical friction and both modes along a key."""
+    columns = {"value": [f"{entry['value']:.6g}" for entry in entries]}
+    columns |= {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
+    for field, (head, factor, form) in zip(fields.MODES, _MODES, strict=True):
+        for mode in (0, 1):
+            values = [each[field.name][mode] for each in entries]
+            shown = [None if value is None else factor * value for value in values]
+            columns[head.format(mode + 1)] = [text_of(value, form=form) for value in shown]
+    return Table(columns, f"Along {', '.join(parameters)}", first=None if len(entries) <= SHORT_POINTS else 0)
+
+
+def _critical(numbers: Mapping[str, Any], show: Renderer) -> str:
+    """The least friction coefficient at which stability is lost, with its error, and how it is lost."""
+    lost = [each for each in numbers["crossings"] if each["friction"] == numbers["critical_friction"]]
+    if not lost:
+        return "none"
+    error = numbers["critical_error"]
+    if error is None:
+        return f"{_crossing(lost[0], show)}, but single windows of the waves have none near it"
+    return _crossing(lost[0], show, error)
+
+
+def _crossing(crossing: Mapping[str, Any], show: Renderer, error: float | None = None) -> str:
+    change = "lost" if crossing["lost"] else "regained"
+    where = f" at {show.text(crossing['frequency'], 'Hz')}" if crossing["frequency"] else ""
+    return (
+        f"{show.with_error(crossing['friction'], error)}: stability {change} by {crossing['instability']}{where}"
+    )
+
+
+def of_advice(report: AdviceReport, show: Renderer) -> View:
+    """Whether it squeals, from which friction on, what helps, and what moves the critical friction."""
+    found = report.stability
+    check = report.check
+    margin = report.margin
+    blocks: list[Row | Table] = []
+    wanted = f"{100.0 * report.wanted_margin:.3g} % is wanted"
+    critical = "none" if found.critical is None else show.text(found.critical.friction)
+    far = "" if margin is None else f", {100.0 * margin:+.2g} % from the case's {found.friction:g}; {wanted}"
+    blocks.append(Row("critical friction", critical + far, detail=True))
+    if under := report.squeal:
+        interval = f"{100.0 * under.squeal_lower:.3g} to {100.0 * under.squeal_upper:.3g} %"
+        share = f"{100.0 * under.squeal_probability:.3g} % (95 %: {interval})"
+        blocks.append(Row(f"squeal under a scatter {report.scatter}", share, detail=True))
+    if report.thresholds.coexists_from is not None:
+        blocks.append(Row("can vibrate from", show.text(report.thresholds.coexists_from)))
+    if report.thresholds.barrier is not None:
+        blocks.append(Row("barrier", show.text(report.thresholds.barrier, "m")))
+    blocks += [Row("note", each) for each in report.notes()]
+    if check:
+        ran = f"{check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
+        blocks += details(Row("checked by a run", f"{ran}: {check.verdict.regime}"))
+        blocks += details(Row("why", "; ".join(check.verdict.reasons)))
+    if report.advice:
+        blocks.append(Table(_advice(report.advice, report.squeal is not None), _RANKED, first=SHORT_ADVICE))
+    if moves := _moves(report):
+        blocks.append(Table(moves, _MOVES, first=0))
+    return View(report.title, [sentence(report.conclusion())], blocks)
+
+
+def _advice(changes: Sequence[Change], under_scatter: bool) -> dict[str, list[str]]:
+    columns = {
+        "what helps": [each.parameter for each in changes],
+        "from": [text_of(each.start) for each in changes],
+        "to": [each.rounded for each in changes],
+        "critical φ": [text_of(each.critical_friction, form=".4g") for each in changes],
+        "safe until": [_until(each) for each in changes],
+        "a run is": [each.check or "-" for each in changes],
+    }
+    if under_scatter:
+        left = [each.squeal.squeal_probability if each.squeal else None for each in changes]
+        columns["squeals"] = ["-" if each is None else f"{100.0 * each:.2g} %" for each in left]
+    return columns
+
+
+def _moves(report: AdviceReport) -> dict[str, list[str]]:
+    """What moves the critical friction, and the growth; empty where nothing does."""
+    moving = [each for each in report.sensitivities if each.elasticity or each.derivative or each.growth_change]
+    if not moving:
+        return {}
+    return {
+        "what moves it": [each.parameter for each in moving],
+        "value": [text_of(each.value) if isinstance(each.value, float) else "list" for each in moving],
+        "% for 1 %": [text_of(each.elasticity, form=".3g") for each in moving],
+        "for a unit": [text_of(each.derivative, form=".3g") for each in moving],
+        "growth for 1 %": [text_of(each.growth_change, form=".3g") for each in moving],
+    }
+
+
+def _until(change: Change) -> str:
+    """Where safe values end, rounded towards them; or where there are none."""
+    if change.to is None:
+        return f"none in {change.lowest:.4g} to {change.highest:.4g}"
+    return "-" if change.until is None else rounded(change.until, change.until < change.to)
+
+
+def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer) -> View:
+    """The answer in a sentence, then each branch with its special points; `numbers` are those of `--json`."""
+    units = units.removeprefix("1")
+    ends = f"{numbers['lower']:g} to {numbers['upper']:g} {units}".strip()
+    rows = [
+        Row("along", f"{numbers['parameter']} from {ends}", detail=True),
+        Row("critical", show.with_error(numbers["critical"], numbers["critical_error"], units)),
+    ]
+    if numbers["coexists_from"] is not None:
+        rows.append(Row("can vibrate from", show.text(numbers["coexists_from"], units)))
+    if numbers["barrier"] is not None:
+        rows.append(Row("barrier", show.text(numbers["barrier"], "m")))
+    if numbers["pushes"]:
+        rows.append(Row("search for other vibrations", f"{numbers['pushes']} pushes", detail=True))
+    if numbers.get("output"):
+        rows.append(Row("file", str(numbers["output"])))
+    tables = []
+    for number, each in enumerate(numbers["branches"] or ()):
+        stable = sum(bool(point["stable"]) for point in each["points"])
+        head = f"branch {number}: {each['kind']}, {len(each['points'])} motions, {stable} of them stable"
+        note = f" ({each['note']})" if each["note"] else ""
+        tables.append(Table(_special_points(each["special"]), head + note))
+    return View(title, sentences([str(numbers["sentence"] or "")]), [*rows, *tables])
+
+
+def _special_points(marks: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+    return {
+        "special point": [mark["kind"] for mark in marks],
+        "value": [f"{mark['value']:.8g}" for mark in marks],
+        "error": [f"{mark['error']:.1g}" if mark["error"] else "-" for mark in marks],
+        "amplitude, m": [text_of(mark["amplitude"] or None, form=".4g") for mark in marks],
+        "frequency, Hz": [text_of(mark["frequency"] or None, form=".5g") for mark in marks],
+        "why": [mark["reason"] or "-" for mark in marks],
+    }
+
+
+def of_scatter(numbers: Mapping[str, Any], title: str) -> View:
+    """The answer in a sentence, then distributions, and on demand probabilities and indices."""
+    from brakecli.scattering.answers import SHARES
+
+    failed = f", {numbers['failed']} without an answer" if numbers["failed"] else ""
+    blocks: list[Row | Table] = [Row("samples", f"{numbers['samples']}{failed}")]
+    blocks += [Row("note", each) for each in numbers["notes"]]
+    if numbers.get("output"):
+        blocks.append(Row("file", str(numbers["output"])))
+    if numbers["quantiles"]:
+        units = {each.name: each.units for each in fields.SCATTERED}
+        heads = [labelled(name.replace("_", " "), units.get(name, "")) for name in numbers["quantiles"]]
+        columns = {"quantiles": heads}
+        for place, share in enumerate(SHARES):
+            columns[f"{share:.0%}"] = [f"{each[place]:.4g}" for each in numbers["quantiles"].values()]
+        blocks.append(Table(columns))
+    lower = numbers["probability_lower"]
+    upper = numbers["probability_upper"]
+    probabilities = {
+        "a sample is": [fields.PROBABLE.get(name, name) for name in numbers["probability"]],
+        "probability": [f"{each:.2%}" for each in numbers["probability"].values()],
+        "95 % interval": [f"{lower[name]:.2%} to {upper[name]:.2%}" for name in numbers["probability"]],
+    }
+    blocks.append(Table(probabilities, first=0))
+    if total := numbers["total"]:
+        names = sorted(total, key=lambda name: -total[name])
+        indices = {
+            "parameter": names,
+            "alone": [f"{numbers['first_order'][name]:.3f}" for name in names],
+            "with all others": [f"{total[name]:.3f}" for name in names],
+            "±": [f"{numbers['total_error'][name]:.2g}" for name in names],
+        }
+        blocks.append(Table(indices, f"What decides on {numbers['indices_of'].replace('_', ' ')}", first=0))
+    return View(title, [sentence(numbers["sentence"])], blocks)
