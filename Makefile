@@ -197,7 +197,6 @@ promise-cost: $(DEV_STAMP) ## a tolerance beside the cheapest entry that keeps i
 
 statistics: $(DEV_STAMP) ## large draws, once per change that may move them, and docs/statistics.md (an hour)
 	$(BIN)/python -m benchmarks.statistics
-	$(BIN)/python -m benchmarks.statistics.prices
 	$(BIN)/python $(PYTEST) -m statistics $(PYTEST_ARGS)
 	$(BIN)/python $(PYTEST) -m campaign -n0 -s -k "few_shoes_stay or threshold_twice" tests/analysis/test_score.py
 

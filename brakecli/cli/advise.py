@@ -7,7 +7,7 @@ from typing import Annotated
 from brakecli.cli.options import AsJson, CaseArgument, Details, ForceRead, Overrides, Quiet, option
 from brakecli.cli.output import show_result, warn
 from brakecli.front.inputs import load_case, load_study
-from brakecli.front.progress import say, telling
+from brakecli.front.progress import telling
 
 KEYS = "Keys that may be advised, with * for any part; masses, stiffnesses, dampings, angles and load if left out."
 STUDY = "Rank by the squeal that is left where keys scatter as in a study."
@@ -29,16 +29,13 @@ def command(
     loaded = load_case(case, overrides)
     study = replace(load_study(scatter, None), base=loaded) if scatter is not None else None
     from brakecli.analysis.stability.advice import KEYS as USUAL
-    from brakecli.runs.advise import advise, advise_seconds
-    from brakecli.runs.cost import duration_text
-    from brakecli.runs.limits import WORTH_SAYING, within_range
+    from brakecli.runs.advise import advise
+    from brakecli.runs.limits import within_range
     from brakecli.runs.run import load_kernels
     from brakecli.views.stability import of_advice
 
     load_kernels(loaded)
     with telling(quiet) as show_progress, within_range():
-        if (seconds := advise_seconds(loaded)) > WORTH_SAYING and not quiet:
-            say(f"a rough pad: this takes about {duration_text(seconds)}")
         report = advise(loaded, keys.split(",") if keys is not None else USUAL, margin, show_progress)
         from brakecli.scattering.advised import under_scatter, under_tolerance
 

@@ -19,20 +19,20 @@ def command(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Validate a case or a sweep; estimate its cost and limits."""
+    """Validate a case or a sweep; what it takes, its limits."""
     if kind_of_file(file) == "sweep":
         sweep = load_sweep(file, overrides)
         from brakecli.runs.limits import free_bytes
-        from brakecli.sweeps.cost import estimate, refuse_sweep
         from brakecli.sweeps.driver import crew
-        from brakecli.views.file import of_estimate
+        from brakecli.sweeps.size import refuse_sweep, size_of
+        from brakecli.views.file import of_size
 
-        cost = estimate(sweep.plan, crew(sweep.plan), spare=True)
-        numbers = {"valid": True, **vars(cost)}
-        view = partial(of_estimate, cost, sweep.title)
+        size = size_of(sweep.plan, crew(sweep.plan), spare=True)
+        numbers = {"valid": True, **vars(size)}
+        view = partial(of_size, size, sweep.title)
         show_result("check", numbers, lambda show: view(), as_json=as_json, quiet=quiet)
-        warn(*cost.refused, *cost.implausible)
-        refuse_sweep(cost, free_bytes(Path()))
+        warn(*size.refused, *size.implausible)
+        refuse_sweep(size, free_bytes(Path()))
         return
     loaded = load_case(file, overrides)
     from brakecli.case.system import system_of
@@ -40,7 +40,7 @@ def command(
     from brakecli.views.file import of_check
 
     with within_range():
-        found = check(system_of(loaded.case), begin=True)
+        found = check(system_of(loaded.case))
     numbers = {"valid": True, "coefficients": found.system.coefficients._asdict()}
     numbers |= {name: getattr(found.system, name) for name in OF_SYSTEM} | vars(found) | vars(found.limits)
     infinite = [name for name, value in numbers.items() if value in (math.inf, -math.inf)]

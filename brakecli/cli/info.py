@@ -3,21 +3,27 @@
 from pathlib import Path
 from typing import Annotated
 
+from brakecli.cli.check import command as check
 from brakecli.cli.options import AsJson, ForceRead, source_argument
 from brakecli.cli.output import show_result
 
 
 def command(
-    result: Annotated[Path, source_argument("FILE.h5", "Result of any kind.")],
+    file: Annotated[
+        str, source_argument("FILE", "Result of any kind; of a case or a sweep what `check` says.")
+    ],
     force_read: ForceRead = False,
     as_json: AsJson = False,
 ) -> None:
     """What a result holds, whether it is whole, what made it."""
+    if file == "-" or Path(file).suffix == ".toml":
+        check(file, as_json=as_json)
+        return
     from brakecli.files.contents import INFO, contents
     from brakecli.files.field import values_of
     from brakecli.files.read import open_result
     from brakecli.views.file import of_info
 
-    with open_result(result) as stored:
+    with open_result(Path(file)) as stored:
         numbers = values_of(INFO, contents(stored))
     show_result("info", numbers, lambda show: of_info(numbers), as_json=as_json, quiet=False)

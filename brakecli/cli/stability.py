@@ -21,7 +21,7 @@ from brakecli.cli.output import show_result
 from brakecli.errors import UsageError, printable
 from brakecli.files.atomic import check_target
 from brakecli.front.inputs import load_case, result_path
-from brakecli.front.progress import say, telling
+from brakecli.front.progress import telling
 
 if TYPE_CHECKING:
     from brakecli.sweeps.tables import Axis
@@ -57,13 +57,12 @@ def command(
     from brakecli.case.system import system_of
     from brakecli.files.field import values_of
     from brakecli.files.stability_fields import LOCK_IN, STABILITY, THRESHOLDS
-    from brakecli.runs.limits import sliding_text, within_range
+    from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
     from brakecli.views.stability import of_stability
 
     with telling(quiet) as show_progress, within_range():
-        if (text := sliding_text(system := system_of(loaded.case))) and not quiet:
-            say(text)
+        system = system_of(loaded.case)
         report = stability(system)
         found = None
         both = None

@@ -38,14 +38,14 @@ def command(
     loaded = load_sweep(file, overrides)
     target = result_path(output, file, kind="sweep")
     from brakecli.runs.run import load_kernels
-    from brakecli.sweeps.cost import Estimate
     from brakecli.sweeps.driver import choose_engine, counting, keeping_points, sweep
+    from brakecli.sweeps.size import Size
     from brakecli.views.points import of_sweep
 
     load_kernels(loaded.base)
     with telling(quiet) as show_progress:
 
-        def begin(found: Estimate, resumed: int) -> None:
+        def begin(found: Size, resumed: int) -> None:
             if not quiet:
                 say(found.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
 

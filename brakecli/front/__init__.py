@@ -1,1 +1,1 @@
-"""What the command line and `import brakecli` share: inputs, measured signals, thresholds, progress and tables."""
+"""What the command line and `import brakecli` share: inputs, measured signals, thresholds and progress."""

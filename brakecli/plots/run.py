@@ -21,14 +21,14 @@ from brakecli.files.valid import BLOCK
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
 from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram
-from brakecli.runs.cost import stability_seconds, table_seconds
-from brakecli.runs.limits import WORTH_SAYING
+from brakecli.runs.work import stability_work, table_work
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import times, values
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 
 CYCLES = 12  # drawn in detail
+MOST_WORK = 5.0  # of finding steady sliding for the frequencies of its modes
 MOST_DETAIL = 100_000  # samples drawn one by one
 FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
@@ -118,7 +118,7 @@ def case_of(result: StoredResult) -> LoadedCase:
 
 def _mode_frequencies(system: System) -> list[float]:
     """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
-    if stability_seconds(system) + table_seconds(system) > WORTH_SAYING:
+    if stability_work(system) + table_work(system) > MOST_WORK:
         return []
     c = system.coefficients
     rest = sliding(system)

@@ -43,7 +43,7 @@ VALUES = 121  # of the friction in the lock-in diagram
 # keys that are shown; the latter on the first page
 MOST_SENSITIVE = 6
 MOST_CHANGES = 5
-MOST_SECONDS = 60.0  # what it may take to ask all
+MOST_WORK = 60.0  # of asking all, as `runs.work` counts it
 _UNITS = [each.units for each in fields.VIBRATION]
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _MAIN = (
@@ -60,7 +60,7 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     found = result.attributes
     loaded = case_of(result)
-    advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_SECONDS), loaded.case)
+    advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_WORK), loaded.case)
     again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
     left_out = sentences(f"Left out: {each}" for each in found.get("left_out", ()))
     sections = [

@@ -19,20 +19,20 @@ from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import values_of
-from brakecli.runs.cost import duration_text, guessed, stability_seconds, table_seconds
 from brakecli.runs.judge import asked, judged_in_memory
 from brakecli.runs.settled import Judged, settled
+from brakecli.runs.work import stability_work, table_work, work_of
 from brakecli.solver.integrate import Counted, Motion
 from brakecli.solver.system import System
 
 # of a run that checks, which is cut short beyond
-CHECK_SECONDS = 5.0
+CHECK_WORK = 5.0
 _CHECK_SAMPLES = 1_000_000
 _DECAYED = 15.0
 _DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
-_ALL_CHECKS_SECONDS = 10.0  # estimated time of all runs that check after which no more is begun
+_ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
 
 
 @dataclass(frozen=True)
@@ -171,10 +171,10 @@ def _far(margin: float | None, own: float) -> str:
     return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
-def advise_seconds(loaded: LoadedCase) -> float:
-    """A rough guess at the time of `advise`: each number of a case is changed to find critical friction anew."""
+def _work(loaded: LoadedCase) -> float:
+    """The work of all advice: each number of a case is changed to find critical friction anew."""
     system = system_of(loaded.case)
-    return len(of_case.numbers(loaded.case)) * (stability_seconds(system) + table_seconds(system))
+    return len(of_case.numbers(loaded.case)) * (stability_work(system) + table_work(system))
 
 
 def advise(
@@ -182,8 +182,8 @@ def advise(
 ) -> AdviceReport:
     """Sensitivities of a case, the nearest safe value of each key that fits a pattern, and a run of the best.
 
-    A case that has the margin (a part of its friction) needs no advice; what takes more than `most` seconds is
-    left out. Raises UsageError.
+    A case that has the margin (a part of its friction) needs no advice; what takes more work than `most` is left
+    out. Raises UsageError.
     """
     case = loaded.case
     advice = list[Change]()
@@ -195,8 +195,8 @@ def advise(
     critical = found.critical if found else None
     sensitivities = list[Sensitivity]()
     left_out = ""
-    if (seconds := advise_seconds(loaded)) > most:
-        left_out = f"what to change is left out: `brakecli advise` takes about {duration_text(seconds)}"
+    if _work(loaded) > most:
+        left_out = "what to change is left out, as it takes long here: `brakecli advise` asks it"
     else:
         for done, path in enumerate(everything if found else ()):
             tell = partial(progress, "derivatives", done, len(everything))
@@ -221,11 +221,11 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
     checks = dict[str, CheckRun]()
     spent = 0.0
     for each in sorted(advice, key=lambda each: each.size):
-        if each.to is None or spent > _ALL_CHECKS_SECONDS or (part := _to_check(case, each)) is None:
+        if each.to is None or spent > _ALL_CHECKS_WORK or (part := _to_check(case, each)) is None:
             continue
-        system, seconds = part
+        system, work = part
         checks[each.parameter] = _checked(system, each, progress)
-        spent = spent + seconds
+        spent = spent + work
     regimes = {key: str(check.verdict.regime) for key, check in checks.items()}
     places: dict[str | None, int] = {Regime.DAMPED: 0, Regime.UNDECIDED: 1, None: 1}
 
@@ -236,7 +236,7 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
 
 
 def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
-    """The case with an advised value, until disturbances have decayed, and the time (s) that its run costs.
+    """The case with an advised value, until disturbances have decayed, and the work of its run.
 
     It is cut short where that takes long. None where the value, with the digits that are shown, is not valid.
     """
@@ -245,11 +245,11 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
         return None
     system = system_of(there)
     found = of_case.answer(there, 0.0)
-    seconds = guessed(system).seconds
+    work = work_of(system).amount
     decays = -found.growth if found and found.growth and system.steady else 0.0
     long = min(_DECAYED / (decays * system.duration), _DECAYED_SAMPLES / system.samples) if decays > 0.0 else 1.0
-    part = min(max(long, 1.0), CHECK_SECONDS / max(seconds, 1e-9), _CHECK_SAMPLES / system.samples)
-    return replace(system, duration=part * system.duration), part * seconds
+    part = min(max(long, 1.0), CHECK_WORK / max(work, 1e-9), _CHECK_SAMPLES / system.samples)
+    return replace(system, duration=part * system.duration), part * work
 
 
 def _checked(system: System, change: Change, progress: Counted) -> CheckRun:

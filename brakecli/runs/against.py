@@ -10,9 +10,9 @@ from dataclasses import replace
 from typing import NamedTuple
 
 from brakecli.runs.certificate import MISSED, NOTHING, Certificate, Certified, compare, displacement
-from brakecli.runs.cost import FINEST, evaluation_seconds
 from brakecli.runs.first import FIRST, ORDER_OF_NODES, first_nodes, first_step
 from brakecli.runs.own_error import MOST_SECONDS, SAFETY, Known, first_of
+from brakecli.runs.work import FINEST, evaluation_work
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion, Work, solve
 from brakecli.solver.method import Method
@@ -162,5 +162,5 @@ def _with_nodes(
     nodes = max(nodes, NODES * math.ceil(more * seen.system.nodes / NODES))
     on_nodes = system.by(nodes=nodes)
     exact = system.by(evaluator="exact")
-    dear = evaluation_seconds(on_nodes) > evaluation_seconds(exact) or on_nodes.table_bytes > MOST_TABLE_BYTES
+    dear = evaluation_work(on_nodes) > evaluation_work(exact) or on_nodes.table_bytes > MOST_TABLE_BYTES
     return exact if dear else on_nodes, spent

@@ -1,4 +1,4 @@
-"""What a case will cost, which limits it meets, and what a careful user should know of it before it runs."""
+"""What a case will take, which limits it meets, and what a careful user should know of it before it runs."""
 
 import math
 import shutil
@@ -20,10 +20,9 @@ from brakecli.analysis.stability.discrete import (
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import RefusedError
-from brakecli.runs.cost import beside_seconds, duration_text, guessed, held_bytes, stability_seconds
 from brakecli.runs.plausible import implausible
-from brakecli.runs.price import measured
 from brakecli.runs.settled import longest
+from brakecli.runs.work import held_bytes, work_of
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
@@ -31,10 +30,8 @@ from brakecli.solver.schedules import values
 from brakecli.solver.system import MOST_STEPS, WHOLE, System
 
 _TWO_DIGITS = Context(prec=2, rounding=ROUND_DOWN)
-MOST_SECONDS = 24 * 3600.0
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
-WORTH_SAYING = 5.0  # s, of work before which its time is said
 _COARSE_NODES = 0.5  # over the usual ones
 _TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
 FILE_BYTES = 1e5  # of a result without its samples
@@ -58,32 +55,25 @@ class Check:
     steps_per_period: float
     limits: StepLimits
     nodes_per_wave: float | None
-    seconds: float
-    at_least: bool  # whether it may take much longer than that
     memory: float  # bytes
     file_size: float  # bytes
     adjustments: tuple[str, ...]
     warnings: tuple[str, ...] = ()
 
 
-def check(system: System, *, begin: bool = False) -> Check:
-    """Look at a case; where `begin`, or where it seems too long, run it for a moment to see what it costs."""
+def check(system: System) -> Check:
+    """Look at a case; nothing is run."""
     own = system.method.own_steps
     fastest = system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
-    price = guessed(system)
-    if (begin or price.seconds > MOST_SECONDS) and system.steps <= MOST_STEPS:
-        price = measured(system) or price._replace(at_least=system.finds_patches)
     found = Check(
         system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
         step=None if own else system.step,
-        steps=price.steps,
+        steps=work_of(system).steps,
         steps_per_period=math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step),
         limits=step_limits(system),
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
-        seconds=price.seconds + beside_seconds(system),
-        at_least=price.at_least or system.settles,
         memory=_PROCESS_BYTES + system.table_bytes + held_bytes(system),
         file_size=float(system.samples) * ROW_BYTES + FILE_BYTES,
         adjustments=tuple(adjustments(system)),
@@ -91,21 +81,16 @@ def check(system: System, *, begin: bool = False) -> Check:
     return replace(found, warnings=tuple(_warnings(found)))
 
 
-def refuse(found: Check, free_bytes: float = math.inf, *, timed: bool = True) -> None:
-    """Raise RefusedError where a run would be too large, or unstable by its scheme.
-
-    Unless `timed`, its text holds no number that was measured, and differs each time.
-    """
+def refuse(found: Check, free_bytes: float = math.inf) -> None:
+    """Raise RefusedError where a run would be too large, or unstable by its scheme."""
     system = found.system
     growth = found.limits.growth
     room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
-    least = "at least " if found.at_least else ""
-    size = f"about {found.steps:.3g} steps, {least}{duration_text(found.seconds)}, {room}"
-    size = size if timed else f"more than {duration_text(MOST_SECONDS)} or {MOST_STEPS:.0e} steps"
+    size = f"about {found.steps:.3g} steps, {room}"
     coarser = "solver.tolerance" if found.step is None else "solver.step"
     remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
-    if found.steps > MOST_STEPS or found.seconds > MOST_SECONDS:
-        raise RefusedError(f"the run is too long: {size}; {remedy}")
+    if found.steps > MOST_STEPS:
+        raise RefusedError(f"the run is too long: {size}, and {MOST_STEPS:.0e} are the most; {remedy}")
     if found.file_size > min(MOST_BYTES, free_bytes):
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     system.refuse_tables()
@@ -116,15 +101,6 @@ def refuse(found: Check, free_bytes: float = math.inf, *, timed: bool = True) ->
         what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
         remedy = f"{shorter}, {system.method.row.unstable}"
         raise RefusedError(f"solver.theta: at this step the scheme is unstable: {what}; {remedy}")
-
-
-def sliding_text(system: System) -> str | None:
-    """How long `stability` will take, where the pad opens; raises RefusedError where that is too long."""
-    seconds = stability_seconds(system)
-    text = f"steady sliding on a pad that opens takes about {duration_text(seconds)}"
-    if seconds > MOST_SECONDS:
-        raise RefusedError(f"{text}; reduce contact.nodes, or the number of waves in roughness")
-    return text if seconds > WORTH_SAYING else None
 
 
 def _blows_up(growth: float, steps: float) -> bool:

@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, displacement, sizes
-from brakecli.runs.cost import FINEST, evaluation_seconds
 from brakecli.runs.first import FIRST, ORDER_OF_NODES, first_nodes
+from brakecli.runs.work import FINEST, evaluation_work
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion
@@ -176,7 +176,7 @@ def exact_is_cheaper(on_nodes: System, system: System) -> bool:
     """Whether so many nodes cost more than the exact contact, if the latter finds patches at all."""
     if not system.finds_patches:
         return False
-    dear = evaluation_seconds(on_nodes) > _EXACT * evaluation_seconds(system)
+    dear = evaluation_work(on_nodes) > _EXACT * evaluation_work(system)
     return dear or on_nodes.table_bytes > MOST_TABLE_BYTES
 
 

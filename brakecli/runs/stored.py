@@ -17,12 +17,12 @@ from brakecli.files import fields
 from brakecli.files.field import plain, values_of
 from brakecli.files.read import open_result
 from brakecli.runs.judge import asked, motion_of, verdict_in_memory
-from brakecli.runs.limits import check
+from brakecli.runs.work import work_of
 from brakecli.solver.history import History
 from brakecli.solver.system import System
 
-MOST_SECONDS = 60.0
-"""Time for which the case of an older file is run again, as it has no record of answers."""
+MOST_WORK = 60.0
+"""Work, as `runs.work` counts it, up to which the case of a file without a record of answers is run again."""
 
 
 class Stored(NamedTuple):
@@ -48,8 +48,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
         shown = {each.name: run.attributes.get(each.name) for each in fields.EXPONENT}
         shown |= {"failure": failure, "vibrations": fields.VIBRATIONS.read({"over_time": changing})}
         if _older(evidence):
-            found = check(system)
-            if failure is None and found.seconds <= MOST_SECONDS:
+            if failure is None and work_of(system).amount <= MOST_WORK:
                 motion, _ = motion_of(asked(system))
                 verdict = verdict_in_memory(motion, system, thresholds)
                 return values_of(fields.VERDICT, {"verdict": verdict}) | shown

@@ -18,13 +18,13 @@ from brakecli.runs.certificate import (
     replica,
     sizes,
 )
-from brakecli.runs.cost import evaluation_seconds
 from brakecli.runs.own_error import by_own_error, last_of
+from brakecli.runs.work import evaluation_work
 from brakecli.solver.integrate import Motion, Progress, solve
 from brakecli.solver.system import System
 
-# Time is guessed from counted work, not measured, so that a case gives the same bytes wherever it runs.
-FIRST_BLOCK = 5e-3  # guessed time (s) of the first block of a run whose steps take one evaluation of the contact
+# Work is counted, no clock is asked, so that a case gives the same bytes wherever it runs.
+FIRST_BLOCK = 5e-3  # work of the first block of a run whose steps take one evaluation of the contact
 SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
 ROUNDED_MARGIN = 20.0  # the error of a piecewise-exact run over the rounding that it has carried along, at most
 ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
@@ -59,7 +59,7 @@ def _solved(system: System, progress: Progress) -> Motion:
     per_sample = system.per_sample
     block = 1
     if system.nodes or not system.method.own_steps:
-        block += int(FIRST_BLOCK / (evaluation_seconds(system) + 1e-6))
+        block += int(FIRST_BLOCK / (evaluation_work(system) + 1e-6))
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
 
 

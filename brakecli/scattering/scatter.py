@@ -28,13 +28,13 @@ from brakecli.solver.integrate import Counted
 from brakecli.sweeps.driver import choose_engine, sweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.listed import GIVEN, Listed
-from brakecli.sweeps.pilot import WORKER_SECONDS
 from brakecli.sweeps.plan import LoadedSweep, Plan, sweep_of
 from brakecli.sweeps.result import SweepReport, unit
+from brakecli.sweeps.size import WORKER_WORK
 from brakecli.sweeps.workers.task import Compute, Engine
 
-_SMOOTH_SECONDS = 4e-4
-_ROUGH_SECONDS = 0.1
+_SMOOTH_WORK = 4e-4
+_ROUGH_WORK = 0.1
 """What the eigenvalues of a sample take, about."""
 _CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
 
@@ -210,8 +210,8 @@ def engine_for(
     compute: Compute | None = None,
 ) -> Engine:
     """The engine for the samples of a plan: this process where workers would take as long to start."""
-    each = _SMOOTH_SECONDS if system_of(plan.case({})).smooth else _ROUGH_SECONDS
-    few = compute is not None and plan.points * each < WORKER_SECONDS
+    each = _SMOOTH_WORK if system_of(plan.case({})).smooth else _ROUGH_WORK
+    few = compute is not None and plan.points * each < WORKER_WORK
     if few and jobs is None and scheduler is None and scheduler_file is None:
         jobs = 1
         in_caller = True

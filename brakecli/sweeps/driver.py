@@ -21,11 +21,11 @@ from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.limits import free_bytes
 from brakecli.solver.beforehand import cores
 from brakecli.solver.integrate import Counted
-from brakecli.sweeps.cost import Estimate, estimate, refuse_sweep
 from brakecli.sweeps.journal import Journal, open_journal
 from brakecli.sweeps.plan import LoadedSweep, Plan
 from brakecli.sweeps.record import Status, blank, unsound
 from brakecli.sweeps.result import Findings, SweepReport, write
+from brakecli.sweeps.size import Size, refuse_sweep, size_of
 from brakecli.sweeps.workers.local import CallerEngine, LocalEngine
 from brakecli.sweeps.workers.task import Compute, Engine, Task, compute_units
 
@@ -124,20 +124,20 @@ def sweep(
     *,
     force: bool,
     task_size: int | None = None,
-    begin: Callable[[Estimate, int], None] = lambda found, resumed: None,
+    begin: Callable[[Size, int], None] = lambda found, resumed: None,
     progress: Callable[[int, int], None] = lambda done, failed: None,
     write: Callable[[ResultFile, SweepReport, Journal], None] = write,
 ) -> SweepReport:
     """Compute every point of a sweep that is not yet there, and write its result file.
 
-    `begin` is called before the start with the estimate and the number of points that an earlier run has left,
+    `begin` is called before the start with the size and the number of points that an earlier run has left,
     `progress` often, with the points that are done and that have failed, and `write` at the end. Raises
     RefusedError, CannotWriteError or UsageError before anything is computed, CannotWriteError also later; a point
     that fails is marked and reported.
     """
     plan = loaded.plan
     start = time.perf_counter()
-    found = estimate(plan, engine.workers, spare=engine.spare)
+    found = size_of(plan, engine.workers, spare=engine.spare)
     engine = engine if found.workers else CallerEngine(engine.compute)
     with new_result(output, force=force) as result:
         refuse_sweep(found, free_bytes(output.resolve().parent))

@@ -53,7 +53,7 @@ def checked(case: Case) -> Check:
     """What is known of a case before it runs; raises RefusedError where it should not."""
     with within_range():
         found = check(asked(system_of(case)))
-        refuse(found, timed=False)  # the same sweep gives the same bytes
+        refuse(found)
     return found
 
 

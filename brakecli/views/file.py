@@ -12,7 +12,7 @@ from brakecli.views.view import Row, Table, View, sentence
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
     from brakecli.runs.limits import Check
-    from brakecli.sweeps.cost import Estimate
+    from brakecli.sweeps.size import Size
 
 _ASIDE = ("title", "regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
 _MAIN = ("regime", "frequency", "amplitude", "excitation", "stick_fraction", "contact_loss_fraction", "critical")
@@ -51,23 +51,20 @@ def of_check(found: Check, title: str, show: Renderer) -> View:
     rows += [
         Row("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
         Row("nodes per shortest wave", show.text(found.nodes_per_wave)),
-        *_cost_rows(found),
+        *_bytes(found),
         *(Row("adjusted", each) for each in found.adjustments),
     ]
     return View(title, blocks=rows)
 
 
-def of_estimate(found: Estimate, title: str) -> View:
+def of_size(found: Size, title: str) -> View:
     """What a sweep would take."""
     workers = str(found.workers or "none, as they would take longer to start")
-    return View(title, blocks=[Row("points", str(found.points)), Row("workers", workers), *_cost_rows(found)])
+    return View(title, blocks=[Row("points", str(found.points)), Row("workers", workers), *_bytes(found)])
 
 
-def _cost_rows(found: Check | Estimate) -> list[Row]:
-    from brakecli.runs.cost import duration_text
-
+def _bytes(found: Check | Size) -> list[Row]:
     return [
-        Row("time", f"{'at least' if found.at_least else 'about'} {duration_text(found.seconds)}"),
         Row("memory", f"about {found.memory / 1e6:.0f} MB"),
         Row("file", f"about {found.file_size / 1e6:.2g} MB"),
     ]

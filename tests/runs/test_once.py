@@ -20,8 +20,7 @@ from tests.commands import ROOT, TINY
 from tests.examples import ROUGH, make
 
 ASKED = {
-    "price": ("brakecli.runs.cost", "guessed"),
-    "pilot": ("brakecli.runs.price", "measured"),
+    "work": ("brakecli.runs.work", "work_of"),
     "limits": ("brakecli.runs.limits", "check"),
     "modes and forced motion": ("brakecli.analysis.stability.linear", "linear_theory"),
     "steady sliding": ("brakecli.solver.steady_sliding", "steady_sliding"),
@@ -69,7 +68,7 @@ def test_a_run_asks_once(case: str, settings: list[str], asked: Counts, tmp_path
     run(load_case(str(ROOT / case), settings), tmp_path / "r.h5", force=False)
     assert asked
     assert {what for (what, *_), count in asked.items() if count > 1} == set()
-    assert sum(count for (what, *_), count in asked.items() if what == "price") == 1
+    assert sum(count for (what, *_), count in asked.items() if what == "work") == 1
     assert sum(count for (what, *_), count in asked.items() if what == "modes and forced motion") <= 1
 
 

@@ -11,7 +11,7 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from brakecli.case.system import system_of
-from brakecli.runs.cost import guessed
+from brakecli.runs.work import work_of
 from brakecli.solver.contact import pad as pads
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import ContactLayer, Pad, build_layer, build_pad, interpolation_error, window_rows
@@ -163,7 +163,7 @@ def test_a_run_is_that_of_sums(method: Method, monkeypatch: pytest.MonkeyPatch) 
     rough = system_of(make(ROUGH, roughness__wheel=MANY, load__force=3000.0))
     rough = replace(rough, method=method, duration=0.005)
     one = solve(rough)
-    seconds = guessed(rough).seconds
+    work = work_of(rough).amount
     assert rough.window_rows > 0
     monkeypatch.setattr(pads, "MOST_SUMMED", 30)
     rough = replace(rough)  # makes its pad anew, as it is too large to be kept
@@ -177,4 +177,4 @@ def test_a_run_is_that_of_sums(method: Method, monkeypatch: pytest.MonkeyPatch) 
     assert abs(one.energy.relative_closing_error) < 1e-4
     assert one.work.steps == other.work.steps
     if not method.own_steps:  # the guess of `check` knows it
-        assert seconds < 0.5 * guessed(rough).seconds
+        assert work < 0.5 * work_of(rough).amount

@@ -6,15 +6,10 @@ import pytest
 from typer.testing import CliRunner
 
 from brakecli.cli.app import app
-from brakecli.errors import RefusedError
 from brakecli.files.read import open_result
-from brakecli.runs import limits
-from brakecli.runs.cost import Price
-from brakecli.sweeps.simulate import checked
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
 from tests.commands import brakecli, left_in
-from tests.examples import ROUGH, make
 from tests.sweeps.helpers import axis, frictions, inline, interrupted, local, write_sweep
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -87,15 +82,3 @@ def test_a_file_that_was_read_before_marks_no_later_result(tmp_path: Path, comma
         assert not other.sealed
     inline(loaded, tmp_path / "after.h5")
     assert (tmp_path / "after.h5").read_bytes() == (tmp_path / "before.h5").read_bytes()
-
-
-def test_a_refused_point_says_nothing_that_was_measured(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever a pilot run has cost here, its record is the same."""
-    said = set[str]()
-    for seconds in (1e6, 2e6):
-        monkeypatch.setattr(limits, "measured", lambda system, seconds=seconds: Price(7, seconds))
-        with pytest.raises(RefusedError) as refused:
-            checked(make(ROUGH, solver__duration=1e7, solver__step=1e-5, output__sample_interval=1.0))
-        said.add(str(refused.value))
-    assert len(said) == 1
-    assert next(iter(said)).startswith("the run is too long: more than 24 hours or 1e+11 steps; reduce ")

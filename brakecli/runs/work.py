@@ -1,4 +1,8 @@
-"""What a run is likely to cost; rough guesses that tell minutes from days."""
+"""Work that is counted before anything runs: steps, evaluations of the contact, bytes.
+
+It decides which evaluator is cheaper, how long a run that checks advice may be, and whether workers are worth
+their start. Its unit is what a core of a usual machine does in a second; no clock is asked, and nobody is told.
+"""
 
 import math
 from contextlib import suppress
@@ -13,16 +17,16 @@ from brakecli.solver.schedules import values
 from brakecli.solver.steady_sliding import PLACES, TABLE, averaged_length, fills_window, steady_sliding
 from brakecli.solver.system import System
 
-# Seconds, measured with `make cases` on one core.
-_STEP_SECONDS = 1.5e-7
-_NODE_SECONDS = 1.2e-9  # per node, and again per node and wave of the wheel:
-_NODE_WAVE_SECONDS = 1e-10
+# Measured with `make cases` on one core, in seconds.
+_STEP_WORK = 1.5e-7
+_NODE_WORK = 1.2e-9  # per node, and again per node and wave of the wheel:
+_NODE_WAVE_WORK = 1e-10
 # with a window: as many waves; to fill it, per point and wave
 _WINDOW_WAVES = 3
-_POINT_WAVE_SECONDS = 1.5e-10
+_POINT_WAVE_WORK = 1.5e-10
 # exact, for each wave on the pad: per harmonic, and per pair of them
-_TERM_SECONDS = 2.5e-8
-_PAIR_SECONDS = 5e-10
+_TERM_WORK = 2.5e-8
+_PAIR_WORK = 5e-10
 # of waves in full contact, which take as long as the rest of a step
 _PAIRS = 20.0
 _OWN_PAIRS = 80.0
@@ -42,41 +46,37 @@ _RUNS = 1.6  # where histories keep a tolerance
 # part of the time in which a pad is open in part: under load, and elsewhere
 _PRESSED = 0.01
 _PLAYS = 0.12
-_OWN_STEP_SECONDS = 4e-6
+_OWN_STEP_WORK = 4e-6
 _OWN_EVALUATIONS = 27.0
-_EXACT_STEP_SECONDS = 1e-7  # events included
-_START_EVALUATIONS = 6.0  # at each place of the wheel
-_TABLE_SECONDS = 4e-9  # to fill a byte of the tables of the contact
-# Beside the loop, measured on runs of 4 to 15 million samples: 0.6 to 0.8 µs of processor time for the file, the
-# spectra and the verdict, most of it to compress the file; and the peak of memory where histories are held.
-_SAMPLE_SECONDS = 8e-7
+_EXACT_STEP_WORK = 1e-7  # events included
+_START_EVALUATIONS = 6.0  # at each place of the wheel, to find steady sliding
+_TABLE_WORK = 4e-9  # to fill a byte of the tables of the contact
 # histories: two with what compares them, or one while it is joined
 _HELD = 4.0
 _HELD_EXACT = 2.0
 
 
-class Price(NamedTuple):
-    """What a case costs: steps of a run, seconds of all of its runs, and whether it may well be much more."""
+class Work(NamedTuple):
+    """The steps of a run, and the work of all runs that a case needs."""
 
     steps: int
-    seconds: float
-    at_least: bool = False
+    amount: float
 
 
-def guessed(system: System) -> Price:
-    """A rough guess at what a case costs, without its file and its verdict."""
+def work_of(system: System) -> Work:
+    """A rough count of the work of a case, without its file and its verdict."""
     method = system.method
     pairs = 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
-        each = _STEP_SECONDS * (1.0 + pairs / _PAIRS)
+        each = _STEP_WORK * (1.0 + pairs / _PAIRS)
         if system.finds_patches or system.nodes:
-            each = _STEP_SECONDS + _EVALUATIONS * evaluation_seconds(system)
-        window = _window_seconds(system, system.sampled_duration * system.fastest_belt)
-        return Price(system.steps, system.steps * each + window)
+            each = _STEP_WORK + _EVALUATIONS * evaluation_work(system)
+        window = _window_work(system, system.sampled_duration * system.fastest_belt)
+        return Work(system.steps, system.steps * each + window)
     c = system.coefficients
     alone = method.step is not None
     if method.row.exact:
-        return Price(system.steps, system.steps * _EXACT_STEP_SECONDS)
+        return Work(system.steps, system.steps * _EXACT_STEP_WORK)
     tolerance = method.tolerance if alone else max(min(_FINER * method.tolerance, _COARSEST), FINEST)
     fastest = system.natural_frequencies[1]
     start = system.initial
@@ -86,19 +86,14 @@ def guessed(system: System) -> Price:
     turns = float(max(system.wheel.turns, default=0.0))
     rate += _STEPS_PER_WAVE * turns * (system.fastest_belt + swing) + (c.b_xx + c.b_yy) / _DECAY / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
-    each = _OWN_STEP_SECONDS * (1.0 + pairs / _OWN_PAIRS)
+    each = _OWN_STEP_WORK * (1.0 + pairs / _OWN_PAIRS)
     if system.finds_patches:
         # Rough surfaces that the load presses together are seldom open in part.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
         least_load = float(np.abs(values(system.load)).min())
         open_part = _PRESSED if heights * (c.c_yy + system.contact_stiffness) < least_load else _PLAYS
-        each += _OWN_EVALUATIONS * open_part * evaluation_seconds(system)
-    return Price(steps, (1.0 if alone else _RUNS) * steps * each)
-
-
-def beside_seconds(system: System) -> float:
-    """A rough guess at the time that a run takes beside its loop: for its file, its spectra and its verdict."""
-    return _SAMPLE_SECONDS * system.samples
+        each += _OWN_EVALUATIONS * open_part * evaluation_work(system)
+    return Work(steps, (1.0 if alone else _RUNS) * steps * each)
 
 
 def held_bytes(system: System) -> float:
@@ -108,31 +103,24 @@ def held_bytes(system: System) -> float:
     return (_HELD_EXACT if system.method.row.exact else _HELD) * 8.0 * len(HISTORY) * system.samples
 
 
-def start_seconds(system: System) -> float:
-    """A rough guess at the time to find steady sliding, where the case starts from it on a pad that opens."""
-    if not system.initial.from_equilibrium or not _opens(system, system.coefficients.phi):
-        return 0.0
-    return _START_EVALUATIONS * _average_seconds(system)
-
-
-def stability_seconds(system: System) -> float:
-    """A rough guess at the time to find steady sliding at every friction coefficient of `stability`."""
+def stability_work(system: System) -> float:
+    """The work of finding steady sliding at every friction coefficient of `stability`."""
     tried = np.linspace(0.0, LARGEST_FRICTION, FRICTIONS).tolist()
     if system.belt_speed == 0.0 or not any(_opens(system, phi) for phi in tried):
         return 0.0
-    return (TABLE + _START_EVALUATIONS) * _average_seconds(system)
+    return (TABLE + _START_EVALUATIONS) * _average_work(system)
 
 
-def table_seconds(system: System) -> float:
-    """A rough guess at the time to fill the tables of the contact, which very many waves make long."""
-    return _TABLE_SECONDS * system.table_bytes
+def table_work(system: System) -> float:
+    """The work of filling the tables of the contact, which very many waves make long."""
+    return _TABLE_WORK * system.table_bytes
 
 
-def _average_seconds(system: System) -> float:
-    """Guessed time (s) of the mean contact at one height."""
+def _average_work(system: System) -> float:
+    """The work of the mean contact at one height."""
     if not fills_window(system):
-        return (PLACES if len(system.wheel.g) else 1) * evaluation_seconds(system, summed=True)
-    return PLACES * evaluation_seconds(system) + _window_seconds(system, averaged_length(system))
+        return (PLACES if len(system.wheel.g) else 1) * evaluation_work(system, summed=True)
+    return PLACES * evaluation_work(system) + _window_work(system, averaged_length(system))
 
 
 def _opens(system: System, phi: float) -> bool:
@@ -152,28 +140,20 @@ def _opens(system: System, phi: float) -> bool:
     return opens
 
 
-def evaluation_seconds(system: System, *, summed: bool = False) -> float:
-    """A rough guess at the time that one evaluation of a contact which is open in part takes.
+def evaluation_work(system: System, *, summed: bool = False) -> float:
+    """The work of one evaluation of a contact that is open in part.
 
     `summed`: without a window.
     """
     if system.finds_patches:
         terms = len(system.shoe.g) + len(system.wheel.g)
         waves = 1.0 + 2.0 * system.half_length * system.most_turns
-        return waves * terms * (_TERM_SECONDS + _PAIR_SECONDS * terms)
+        return waves * terms * (_TERM_WORK + _PAIR_WORK * terms)
     waves = _WINDOW_WAVES if system.window_rows and not summed else len(system.wheel.g)
-    return system.nodes * (_NODE_SECONDS + _NODE_WAVE_SECONDS * waves)
+    return system.nodes * (_NODE_WORK + _NODE_WAVE_WORK * waves)
 
 
-def _window_seconds(system: System, travel: float) -> float:
-    """A rough guess at the time to fill the window while the wheel travels so far (m)."""
+def _window_work(system: System, travel: float) -> float:
+    """The work of filling the window while the wheel travels so far (m)."""
     points = system.nodes * system.window_rows * (1.0 + travel / (2.0 * system.half_length))
-    return points * len(system.wheel.g) * _POINT_WAVE_SECONDS
-
-
-def duration_text(seconds: float) -> str:
-    """A time in the unit that people would say it in."""
-    for unit, size in (("years", 3.156e7), ("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
-        if seconds >= 2.0 * size:
-            return f"{seconds / size:.3g} {unit}"
-    return f"{seconds:.2g} s"
+    return points * len(system.wheel.g) * _POINT_WAVE_WORK
