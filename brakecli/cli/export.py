@@ -1,5 +1,6 @@
 """`brakecli export`."""
 
+import math
 from pathlib import Path
 from typing import Annotated
 
@@ -16,17 +17,21 @@ def command(
     output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
     variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
     group: Annotated[str | None, option(GROUP, "GROUP")] = None,
+    start: Annotated[float | None, option("First time in s, of what has a time.", "S", "--from")] = None,
+    end: Annotated[float | None, option("Last time in s.", "S", "--to")] = None,
+    every: Annotated[int, option("Keep one of so many samples, the first one among them.", "N", min=1)] = 1,
     force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
     """Write numbers as CSV, or a motion as sound."""
-    from brakecli.files.export import export
+    from brakecli.files.export import Part, export
     from brakecli.files.read import open_result
 
     target = result_path(output, str(result), ending=".csv")
     with open_result(result) as stored:
-        notes = export(stored, target, group, variables or (), force=force)
+        part = Part(-math.inf if start is None else start, math.inf if end is None else end, every)
+        notes = export(stored, target, group, variables or (), part, force=force)
     warn(*notes)
     if not quiet:
         show(f"{target}: written")

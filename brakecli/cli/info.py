@@ -9,9 +9,7 @@ from brakecli.cli.output import show_result
 
 
 def command(
-    file: Annotated[
-        str, source_argument("FILE", "Result of any kind; of a case or a sweep what `check` says.")
-    ],
+    file: Annotated[str, source_argument("FILE", "Result of any kind; of a case or a sweep what `check` says.")],
     force_read: ForceRead = False,
     as_json: AsJson = False,
 ) -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -51,8 +51,19 @@ _AXES = {
 }
 
 
+class Part(NamedTuple):
+    """The part of a motion that is exported: both ends (s), and of how many samples one is kept."""
+
+    start: float = -math.inf
+    end: float = math.inf
+    every: int = 1
+
+
+WHOLE = Part()
+
+
 def export(
-    result: StoredResult, target: Path, group: str | None, names: Sequence[str], *, force: bool
+    result: StoredResult, target: Path, group: str | None, names: Sequence[str], part: Part = WHOLE, *, force: bool
 ) -> list[str]:
     """Write numbers of a result as CSV, or one variable of a run as WAV; sentences on what was left out.
 
@@ -80,6 +91,12 @@ def export(
     if suffix == ".wav" and (group not in (None, "history") or len(names) > 1):
         remedy = f"give one {argument('variable')} and no other group"
         raise UsageError(f"{target}: a sound is one variable of the history; {remedy}")
+    group = group or ("history" if kind == "run" else "/")
+    if part != WHOLE and _AXES.get(group, ("",))[0] != "time":
+        ends = ", ".join(map(argument, ("from", "to", "every")))
+        raise UsageError(f"{ends}: are for what has a time, as the history of a run; leave them out")
+    if suffix == ".wav" and part.every > 1:
+        raise UsageError(f"{argument('every')}: would bend the tones of a sound; leave it out")
     mark = readings.mark()
     if suffix == ".wav" and mark:
         raise UsageError(f"{target}: a sound cannot say that it was {mark}; export .csv")
@@ -87,10 +104,10 @@ def export(
         notes = list[str]()
         file.write(f"# {mark}\n".encode() * bool(mark))
         if suffix == ".wav":
-            sound, notes = _sound(result, names[0] if names else "vx")
+            sound, notes = _sound(result, names[0] if names else "vx", part)
             file.write(sound)
         else:
-            for rows in _rows(result, group or ("history" if kind == "run" else "/"), names):
+            for rows in _rows(result, group, names, part):
                 stream = io.StringIO()
                 csv.writer(stream, lineterminator="\n").writerows(rows)
                 file.write(stream.getvalue().encode())
@@ -98,7 +115,7 @@ def export(
     return notes
 
 
-def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[list[Sequence[Any]]]:
+def _rows(result: StoredResult, group: str, names: Sequence[str], wanted: Part) -> Iterator[list[Sequence[Any]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     known = result.variables(group)
     axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(known)
@@ -114,17 +131,31 @@ def _rows(result: StoredResult, group: str, names: Sequence[str]) -> Iterator[li
         header += [_head(f"{name} of {inner[0]} {number + 1}" if inner else name, known[name]) for number in kept]
     yield [_cells(np.array(header))]
     places = [result.read(group, axis) for axis in axes]
-    rows = max(1, _BLOCK // math.prod(shape[1:]))
-    for start in range(0, shape[0], rows):
-        part = places[0][start : start + rows]
+    first, last = _ends(places[0], wanted) if wanted != WHOLE else (0, shape[0])
+    every = wanted.every
+    rows = every * max(1, _BLOCK // math.prod(shape[1:]))
+    for start in range(first, last, rows):
+        stop = min(start + rows, last)
+        part = places[0][start:stop:every]
         columns = [each.ravel() for each in np.meshgrid(part, *places[1:], indexing="ij")]
         for name, kept in chosen.items():
             if known[name].dims == axes[1:]:  # alike in both directions
                 values = np.broadcast_to(result.read(group, name), (len(part), *shape[1:]))
             else:
-                values = result.read(group, name, start, start + rows)
+                values = result.read(group, name, start, stop)[::every]
             columns += [*values.reshape(len(columns[0]), -1).T[kept]]
         yield [*zip(*map(_cells, columns), strict=True)]
+
+
+def _ends(time: NDArray[Any], wanted: Part) -> tuple[int, int]:
+    """The rows between two times, both included; raises UsageError where there are none."""
+    first = int(np.searchsorted(time, wanted.start, "left"))
+    last = int(np.searchsorted(time, wanted.end, "right"))
+    if first >= last:
+        between = f"{argument('from')} {wanted.start:g}, {argument('to')} {wanted.end:g}"
+        there = f"those of the result reach from {time[0]:g} to {time[-1]:g} s" if len(time) else "there is none"
+        raise UsageError(f"{between}: no time lies there; {there}")
+    return first, last
 
 
 def _cells(column: NDArray[Any]) -> list[Any]:
@@ -171,15 +202,17 @@ def _head(name: str, variable: Variable) -> str:
     return labelled(name, plain_units(str(variable.attributes.get("units", ""))))
 
 
-def _sound(result: StoredResult, name: str) -> tuple[bytes, list[str]]:
+def _sound(result: StoredResult, name: str, part: Part) -> tuple[bytes, list[str]]:
     """A variable of a history as a WAV file of 16 bits, without its mean; what cannot be heard of it."""
     from scipy.io import wavfile
     from scipy.signal import resample_poly
 
     known = result.variables("history")
     _checked([name], [each for each in known if each not in ("time", "state")], result)
-    steps = np.diff(result.read("history", "time"))
-    values = result.read("history", name) if len(steps) else np.zeros(0)
+    time = result.read("history", "time")
+    first, last = _ends(time, part) if part != WHOLE else (0, len(time))
+    steps = np.diff(time[first:last])
+    values = result.read("history", name, first, last) if len(steps) else np.zeros(0)
     if len(steps) and np.ptp(steps) > _UNEVEN * np.median(steps):
         raise UsageError(f"{result.path}: its samples are not equally spaced, as a sound needs them; export .csv")
     duration = float(np.mean(steps)) * len(values) if len(values) else 0.0

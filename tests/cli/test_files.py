@@ -80,6 +80,30 @@ def test_a_history_as_csv_is_the_history_to_the_last_bit(folder: Path, tmp_path:
         np.testing.assert_array_equal(table[name + unit], history(folder / "a.h5", name))
 
 
+def test_a_part_of_a_history_is_exported_and_one_of_several_samples(folder: Path, tmp_path: Path) -> None:
+    whole = exported(folder, tmp_path)
+    part = exported(folder, tmp_path, "--from", "0.1", "--to", "0.2")
+    few = exported(folder, tmp_path, "--every", "7")
+    time = whole[:, 0]
+    np.testing.assert_array_equal(part, whole[(time >= 0.1) & (time <= 0.2)])
+    np.testing.assert_array_equal(few, whole[::7])
+    lines = [
+        ["export", "a.h5", "--from", "0.3", "--to", "0.2", "-o", "no.csv"],
+        ["export", "a.h5", "--group", "spectrum", "--every", "2", "-o", "no.csv"],
+        ["export", "a.h5", "--every", "2", "-o", "no.wav"],
+    ]
+    words = ["no time lies there", "are for what has a time", "would bend the tones"]
+    for done, word in zip(each(folder, lines), words, strict=True):
+        done.told(2, word)
+    assert not (folder / "no.csv").exists()
+
+
+def exported(folder: Path, tmp_path: Path, *options: str) -> Any:
+    """The rows of an exported history."""
+    brakecli("export", "a.h5", *options, "-o", str(tmp_path / "part.csv"), "--force", cwd=folder).told(0)
+    return np.loadtxt(tmp_path / "part.csv", delimiter=",", skiprows=1)
+
+
 def test_what_is_exported_can_be_classified_by_its_names_and_units(folder: Path, tmp_path: Path) -> None:
     export = ["export", folder / "b.h5", "-o", "v.csv", "--variable", "vx", "-q"]
     columns = [
