@@ -26,7 +26,7 @@ from brakecli.front import progress
 from brakecli.front.progress import telling
 from brakecli.views.view import sentence
 from tests.campaign import campaign
-from tests.commands import QUICK, ROOT, TINY, left_in
+from tests.commands import QUICK, ROOT, TINY, attributes, left_in
 from tests.commands import brakecli as command
 
 HERE = Path()
@@ -60,6 +60,17 @@ def test_a_run_is_that_of_the_command(tmp_path: Path) -> None:
     assert float(verdict.frequency) == printed["frequency"]
     assert json.loads(verdict.attrs["thresholds"])["stick_cycles"] == 0.9
     verdict.to_netcdf(tmp_path / "v.nc", engine="h5netcdf")
+
+
+def test_numbers_of_a_verdict_that_do_not_exist_are_nan_and_in_no_file(tmp_path: Path) -> None:
+    found = brakecli.run(CASE, SHORT | {"friction.coefficient": 0.3})
+    assert found.attrs["regime"] == "damped"
+    assert np.isnan(found.attrs["frequency"])
+    found.brakecli.table()
+    again = brakecli.run(CASE, SHORT | {"friction.coefficient": 0.3}, output=tmp_path / "r.h5")
+    assert "frequency" not in attributes(tmp_path / "r.h5")
+    assert found.identical(again)
+    assert brakecli.diff(found, tmp_path / "r.h5").numbers == []
 
 
 def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

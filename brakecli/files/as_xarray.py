@@ -1,6 +1,7 @@
 """Results and numbers as xarray holds them."""
 
 import json
+import math
 import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -20,6 +21,7 @@ from brakecli.files.trust import MISSING, readings
 def opened(path: Path, *, own: bool = False) -> xr.DataTree:
     """A result file in memory, checked; what other programs have put there may be more than xarray takes.
 
+    A run without a frequency has NaN as its attribute `frequency`; no file holds that.
     A file that this program has just written (`own`) has no limit of memory.
     """
     try:
@@ -29,6 +31,8 @@ def opened(path: Path, *, own: bool = False) -> xr.DataTree:
             with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:
                 found: xr.DataTree = tree.load()
             found.attrs |= readings.noted()
+            if found.attrs.get("kind") == "run":
+                found.attrs.setdefault("frequency", math.nan)
             for node in found.subtree:  # of results that xarray has saved; those of ours are read as str
                 for name in [str(name) for name, each in node.variables.items() if each.dtype.kind == "S"]:
                     texts = node[name].astype(str).astype(object)
@@ -49,6 +53,8 @@ def stored(found: xr.Dataset | xr.DataTree, name: str) -> Iterator[Path]:
     """
     with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
         path = Path(folder) / name
+        found = found.copy(deep=False)
+        found.attrs = {key: each for key, each in found.attrs.items() if not _missing(each)}
         try:
             found.to_netcdf(path, engine="h5netcdf")
         except (ValueError, TypeError, OSError, RuntimeError) as error:
@@ -62,6 +68,11 @@ def stored(found: xr.Dataset | xr.DataTree, name: str) -> Iterator[Path]:
             raise
         finally:
             readings.unchecked = before
+
+
+def _missing(value: Any) -> bool:
+    """Whether an attribute stands for a number that does not exist."""
+    return isinstance(value, float) and math.isnan(value)
 
 
 def _check(result: StoredResult, *, own: bool) -> None:

@@ -22,6 +22,7 @@ WORKER_WORK = 1.3
 # Work of a point beside its run: of a verdict that comes early, and of a search for a critical value.
 _EARLY = 3e-3
 _SEARCH = 0.1
+_SEARCH_RUNS = 12.0  # of a search by simulation, for the least sustained value
 # Bytes, measured with `make bench-sweep`.
 _WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
@@ -75,7 +76,9 @@ def size_of(plan: Plan, workers: int, *, spare: bool = False) -> Size:
             samples = max(samples, system.samples)
             tables = max(tables, system.table_bytes)
             run = _EARLY if may_be_early(system) else work_of(system).amount
-            work = max(work, run + (_SEARCH if critical is not None else 0.0))
+            if critical is not None:
+                run = _SEARCH + (_SEARCH_RUNS * run if critical.method == "simulation" else run)
+            work = max(work, run)
             together = min(together, TOGETHER if plan.followed is None and loops([asked(system)]) else 1)
     if spare and plan.units * plan.unit_length * work < WORKER_WORK:
         workers = 0
