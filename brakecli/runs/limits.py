@@ -27,6 +27,7 @@ from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.schedules import values
+from brakecli.solver.schemes import module_of
 from brakecli.solver.system import MOST_STEPS, WHOLE, System
 
 _TWO_DIGITS = Context(prec=2, rounding=ROUND_DOWN)
@@ -234,7 +235,8 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
 def _taken(system: System, steps: int) -> float:
     """Part of the fastest motion, without dashpots and friction, that the scheme takes away in so many steps."""
     c = system.coefficients._replace(b_xx=0.0, b_xy=0.0, b_yy=0.0, phi=0.0)
-    factors = np.linalg.eigvals(amplification(c, system.weights, system.scheme, system.contact_stiffness))
+    scheme = module_of(system.method.scheme)
+    factors = np.linalg.eigvals(amplification(c, system.weights, scheme, system.contact_stiffness))
     left = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
     if left > 1.0 - _ROUNDING:
         return 0.0

@@ -111,7 +111,7 @@ def refuse_sweep(found: Size, free_bytes: float) -> None:
     """Raise RefusedError where a sweep would be too large."""
     if found.points > MOST_POINTS:
         most = f"{MOST_POINTS:,} points are the most"
-        raise RefusedError(f"the sweep is too large, {most}: {found.sentence()}; take fewer points")
+        raise RefusedError(f"the sweep is too large: {found.sentence()}, and {most}; take fewer points")
     if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
         free = f"{free_bytes / 1e6:.3g} MB are free"
         remedy = "free some space, or take fewer points"

@@ -181,7 +181,7 @@ def read_by_all(path: Path, what: str, readers: list[Reader]) -> None:
 @pytest.fixture
 def without_advice(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages of runs without advice, which takes seconds and is about the case, not about what a file holds."""
-    monkeypatch.setattr(of_run, "MOST_SECONDS", -1.0)
+    monkeypatch.setattr(of_run, "MOST_WORK", -1.0)
 
 
 @pytest.mark.usefixtures("without_advice")

@@ -226,8 +226,10 @@ def test_without_advice_the_first_page_says_so(
 def test_advice_that_would_take_long_is_left_to_the_command(
     results: list[Path], plain: None, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(of_run, "MOST_SECONDS", -1.0)
-    assert "What to change is left out: `brakecli advise` takes about" in reported(results[0]).html
+    monkeypatch.setattr(of_run, "MOST_WORK", -1.0)
+    assert (
+        "What to change is left out, as it takes long here: `brakecli advise` asks it" in reported(results[0]).html
+    )
 
 
 @campaign

@@ -54,9 +54,7 @@ def test_answers_under_their_earlier_names_decide_as_well(path: Path, monkeypatc
     assert not {*RENAMED} & {*Answers._fields}
 
 
-def test_an_older_file_is_run_again_where_that_takes_a_minute_at_most(
-    path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_older_file_is_run_again_where_that_is_little_work(path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     now = stored.classify_result(path, Thresholds())
     with_evidence(monkeypatch, lambda _: {"envelope_final": 1.0})  # as an older version does
     again = stored.classify_result(path, Thresholds())
@@ -68,7 +66,7 @@ def test_an_older_file_is_run_again_where_that_takes_a_minute_at_most(
     strict = stored.classify_result(path, Thresholds(comes_together=1e9, settled_within=0.0, sure_errors=0.0))
     assert strict["evidence"]["row"] != now["evidence"]["row"]
     assert strict["thresholds"]["comes_together"] == 1e9
-    monkeypatch.setattr(stored, "MOST_SECONDS", 0.0)
+    monkeypatch.setattr(stored, "MOST_WORK", 0.0)
     late = stored.classify_result(path, Thresholds())
     assert (late["regime"], late["settled"]) == ("undecided", 0)
     assert late["reasons"][0].endswith(f"brakecli run {path.name} -o NEW.h5")

@@ -107,7 +107,7 @@ def good(compiled: None, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_cluster_gives_the_bytes_of_a_sweep_at_home(cluster: Cluster, good: Path, here: Path) -> None:
     done = brakecli("sweep", "s.toml", "--scheduler", cluster.address, "--task-size", "7", "--json", cwd=here)
-    assert re.fullmatch(r"brakecli: 60 points on [12] workers?: about .*\n", done.told(0))
+    assert re.fullmatch(r"brakecli: 60 points on [12] workers?: \d+ MB of memory, .*\n", done.told(0))
     assert done.json["points"] == 60
     assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
     assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}

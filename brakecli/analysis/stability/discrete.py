@@ -12,7 +12,7 @@ from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.method import MOST_EVALUATIONS, Method
 from brakecli.solver.records import PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
-from brakecli.solver.schemes import SteppingModule
+from brakecli.solver.schemes import SteppingModule, module_of
 from brakecli.solver.steps.implicit import newton
 from brakecli.solver.system import System
 
@@ -36,7 +36,7 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
     """
     if system.method.own_steps:
         return StepLimits(contraction=0.0, unique=True, growth=1.0)
-    scheme = cast(SteppingModule, system.scheme)
+    scheme = cast(SteppingModule, module_of(system.method.scheme))
     c = system.coefficients
     contact_stiffness = system.contact_stiffness
     s = system.weights if step is None else system.weights._replace(h=step)
@@ -99,7 +99,8 @@ def spectral_radius(system: System, contact_stiffness: float, phi: float, step: 
     s = system.weights if step is None else system.weights._replace(h=step)
     if system.belt_speed < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
         c = c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
-    return float(np.abs(np.linalg.eigvals(amplification(c, s, system.scheme, contact_stiffness))).max())
+    scheme = module_of(system.method.scheme)
+    return float(np.abs(np.linalg.eigvals(amplification(c, s, scheme, contact_stiffness))).max())
 
 
 def without_damping(method: Method) -> str:

@@ -159,11 +159,16 @@ SCHEMES: dict[str, Scheme] = {
 }
 
 
+def module_of(name: str) -> SchemeModule:
+    """The module of a scheme: its equations, for which no kernel is loaded."""
+    return cast(SchemeModule, import_module(SCHEMES[name].module))
+
+
 def load(name: str) -> SchemeModule:
     """The module of a scheme; its loop is loaded before anything is timed."""
     from brakecli.solver import kernels
     from brakecli.solver.steps import loop
 
-    module = cast(SchemeModule, import_module(SCHEMES[name].module))
+    module = module_of(name)
     kernels.load(getattr(module, "advance", loop.advance))
     return module
