@@ -32,6 +32,8 @@ _DECAYED = 15.0
 _DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
+OF_A_STUDY = "as of the study"
+"""The scatter of a study in words."""
 _ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
 
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from brakecli.analysis.stability.advice import rounded
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import labelled
+from brakecli.runs.advise import OF_A_STUDY
 from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import Row, Table, View, details, sentence, sentences
 
@@ -174,7 +175,8 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
         blocks += details(Row("checked by a run", f"{ran}: {check.verdict.regime}"))
         blocks += details(Row("why", "; ".join(check.verdict.reasons)))
     if report.advice:
-        blocks.append(Table(_advice(report.advice, report.squeal is not None), _RANKED, first=SHORT_ADVICE))
+        ranked = _RANKED_BY_STUDY if report.scatter == OF_A_STUDY else _RANKED
+        blocks.append(Table(_advice(report.advice, report.squeal is not None), ranked, first=SHORT_ADVICE))
     if moves := _moves(report):
         blocks.append(Table(moves, _MOVES, first=0))
     return View(report.title, [sentence(report.conclusion())], blocks)

@@ -312,8 +312,8 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
         assert each["squeal_probability"] == float(changed.probability.sel(outcome="squeal"))
         path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
     shown = command("advise", "shoe.toml", "--scatter", "study.toml", cwd=tmp_path).out
-    assert "squeal under scatter" in shown
-    assert "in place of" in shown
+    assert "under a scatter as of the study" in " ".join(shown.split())
+    assert "What leaves least squeal under the study's scatter first" in " ".join(shown.split())
 
 
 @campaign
