@@ -491,7 +491,7 @@ def test_a_notebook_shows_the_table_and_the_picture(tmp_path: Path) -> None:
     shown = tree.brakecli
     table = command("classify", "r.h5", cwd=tmp_path).out.split()
     assert repr(shown).split()[-20:] == [each for each in repr(shown).split()[-20:] if each in table]
-    assert shown.reasons[0].split(":")[0] in repr(shown)
+    assert shown.reasons[0].split(":")[0] in " ".join(repr(shown).split())
     page = shown._repr_html_()
     assert page.startswith("<pre>")
     assert 'src="data:image/png;base64,' in page
