@@ -25,7 +25,7 @@ def test_a_sweep_of_a_billion_points_is_refused_at_once_with_its_size(tmp_path: 
         write_sweep(folder, *tables)
         told = brakecli("sweep", "s.toml", "-j", "2", cwd=folder).told(
             3,
-            f"brakecli: the sweep is too large: {1 + (name == 'followed')}000000000 points on 2 workers: about ",
+            f"brakecli: the sweep is too large: {1 + (name == 'followed')}000000000 points on 2 workers: ",
             " MB of memory, a file of ",
         )
         assert told.count("\n") == 1
