@@ -407,16 +407,16 @@ def test_first_commands_side_by_side_wait_for_one_and_a_killed_one_leaves_nothin
     def compiled() -> int:
         return len([*(tmp_path / "cache").rglob("*.nbc")])
 
-    with started("check", "tiny.toml", cwd=tmp_path, **cache) as first:
+    with started("run", "tiny.toml", "-o", "first.h5", cwd=tmp_path, **cache) as first:
         wait_until(lambda: compiled() > 0)
         os.killpg(first.pid, signal.SIGKILL)
     with (
-        started("check", "tiny.toml", cwd=tmp_path, **cache) as one,
-        started("check", "tiny.toml", "-q", cwd=tmp_path, **cache) as two,
+        started("run", "tiny.toml", "-o", "one.h5", cwd=tmp_path, **cache) as one,
+        started("run", "tiny.toml", "-o", "two.h5", "-q", cwd=tmp_path, **cache) as two,
     ):
         said = ended(one, 900.0).told(0)
         assert ended(two, 900.0).told(0) == ""
     assert said.startswith(SENTENCE)
-    assert brakecli("check", "tiny.toml", cwd=tmp_path, stdin="", **cache).told(0) == ""
+    assert brakecli("run", "tiny.toml", "-o", "three.h5", cwd=tmp_path, stdin="", **cache).told(0) == ""
     (folder,) = (tmp_path / "cache" / "brakecli").iterdir()
     assert int((folder / "total").read_text()) == compiled() > 5
