@@ -217,7 +217,7 @@ class Answers:
             parts.append(
                 f"at the case's {self.own:.4g} an unstable cycle of {metres(self.barrier)} lies between the two"
             )
-        parts += [f"the branch is cut at {mark.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
+        parts += [f"the branch is cut at {mark.motion.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
         return "; ".join(filter(None, [*parts, *self.explored.notes, self.sought]))
 
     @cached_property

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from brakecli.branches.extent import Extent, extent
 from brakecli.branches.line import Line
 from brakecli.branches.point import Point
 from brakecli.branches.problem import Array, Guess, Problem, Seen, steps_in_p
@@ -41,6 +42,8 @@ LOOKED = 256
 CORRECTED = 8
 """Places of a cycle at which it is compared with another chart, and corrections of the nearest by Newton's
 method. Choices."""
+PIECES = 64
+"""Parts of a period between whose ends a cycle is a cubic."""
 SHORTEST = 1e-3
 LONGEST = 400.0
 """Periods of a chart between which a period is sought."""
@@ -179,6 +182,17 @@ class Cycles(Problem):
         if with_parameter and by_p is None:
             return "the derivative by the parameter meets a border, or the end of what is valid"
         return Seen(gap, by_u, by_p, (chart.basis.T @ on_plane)[None], cyclic(word), facts, margins)
+
+    def extent(self, point: Point) -> Extent:
+        """How far the motion of a point reaches, and where it is in the mean."""
+        flow = self.flow(point.p)
+        cycle = point.facts
+
+        def carry(_: float, state: Array, span: float) -> tuple[Array, Array] | None:
+            how = flow(state, span, False)
+            return (flow.state, np.array(flow.path.velocity)) if how == DONE else None
+
+        return extent([np.array(cycle.state)], cycle.period, cycle.times, PIECES, carry)
 
     def _by_p(self, u: Array, p: float, end: Array, word: tuple[int, ...]) -> Array | None:
         """The derivative of the gap by p, of the same sequence of events: central, or else to one side."""

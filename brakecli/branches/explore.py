@@ -110,7 +110,7 @@ class Explorer:
 
         On smooth pads vibrations beside these are sought by five times so many `pushes`.
         """
-        self.branches.append(slid(self.line, self.slides, self.changes))
+        self.branches.append(slid(self.sliding, self.slides, self.changes))
         if not self.branches[0].points:
             self.notes.insert(0, "there is no steady sliding in the range")
         if self.line.case.roughness.wheel is not None:
@@ -198,7 +198,7 @@ class Explorer:
         for change in changes:
             if change.kind != "flutter" or self._over():
                 continue
-            if any(mark.kind == "flutter" and mark.value == self.line.value(change.p) for mark in self._marks()):
+            if any(mark.kind == "flutter" and mark.motion.value == self.line.value(change.p) for mark in self._marks()):
                 continue  # a branch from another flutter has ended here
             problem = self._problem()
             first = sliding.vibration(problem, change)

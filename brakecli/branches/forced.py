@@ -16,6 +16,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli.branches.cycles import cyclic
+from brakecli.branches.extent import Extent, extent
 from brakecli.branches.follow import follow
 from brakecli.branches.frame import NO_PERIOD, Frame, frame_of, resting
 from brakecli.branches.line import Line
@@ -183,6 +184,20 @@ class Forced(Doubled):
             found.word,
             tuple(k * segment + time for k, run in enumerate(runs) for time in run.times),
         )
+
+    def extent(self, point: Point) -> Extent:
+        """How far the motion of a point reaches, and where it is in the mean."""
+        flow, _ = self.flow(point.p)
+        motion = point.facts
+        states = self.origin(point.p) + point.u.reshape(-1, 4) * self.frame.scales
+        length = motion.period / self.segments
+
+        def carry(time: float, state: Array, span: float) -> tuple[Array, Array] | None:
+            steps = max(1, round(self.frame.steps * span / length))
+            run = flow(state, time, span, steps, False)
+            return (run.state, run.velocity) if run.status is Status.DONE else None
+
+        return extent([*states], motion.period, motion.times, self.frame.steps, carry)
 
     def _margins(self, p: float, found: _Flown) -> tuple[float, ...]:
         """How far a motion in slip alone is from stick: its least sliding speed over that of the wheel."""

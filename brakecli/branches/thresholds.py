@@ -97,7 +97,7 @@ def _beside(answers: Answers, critical: float) -> str:
     coexisting = answers.coexisting
     further = {"budget": "; `brakecli branch` follows it further"}
     cut = [
-        f"the branch is cut at {mark.value:.4g}: {mark.reason}{further.get(mark.kind, '')}"
+        f"the branch is cut at {mark.motion.value:.4g}: {mark.reason}{further.get(mark.kind, '')}"
         for mark in answers.cut[:1]
     ]
     cut += answers.explored.notes[:1]

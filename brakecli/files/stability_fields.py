@@ -62,26 +62,36 @@ LOCK_IN = (
 
 # Branches along a key
 
-BRANCH_POINT = (
+MOTION = (
     Field("value", "of the key", "value of the key"),
     Field("amplitude", "m", "half of peak to peak of x; 0 in steady sliding"),
-    Field("frequency", "Hz", "frequency of the motion; of steady sliding that of its least stable mode"),
+    Field("amplitude_y", "m", "half of peak to peak of y", at="extent."),
+    Field("amplitude_vx", "m/s", "half of peak to peak of vx", at="extent."),
+    Field("mean_x", "m", "mean of x over a period; in steady sliding its place", at="extent."),
+    Field("mean_y", "m", "mean of y", at="extent."),
+    Field(
+        "frequency",
+        "Hz",
+        "frequency of the motion; of steady sliding that of the mode that is first to grow, or nearest to it",
+    ),
     ratio("stick_fraction", "part of the time in stick"),
     ratio("contact_loss_fraction", "part of the time without contact"),
+)
+"""Of a motion on a branch, and at its special points."""
+BRANCH_POINT = (
+    *within("motion.", *MOTION),
     Field("stable", "1", "whether disturbances die out", "?"),
     Field(
         "multipliers",
         "1",
-        "Floquet multipliers; of steady sliding for a period of its least stable mode, or for 1 s",
+        "Floquet multipliers; of steady sliding for a period of its mode, or for 1 s",
         "(4,2)f8",
     ),
 )
 SPECIAL = (
     Field("kind", "", "what changes there", "S16"),
-    Field("value", "of the key", "value of the key"),
-    Field("error", "of the key", "error of that value"),
-    Field("amplitude", "m", "half of peak to peak of x"),
-    Field("frequency", "Hz", "frequency of the motion"),
+    *within("motion.", *MOTION),
+    Field("error", "of the key", "error of the value"),
     Field("reason", "", "of an end: why the branch ends there", TEXT),
 )
 ONE_BRANCH = (

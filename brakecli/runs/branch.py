@@ -131,13 +131,13 @@ def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> N
                 result.column(replace(own, kind="f8"), ("point", "multiplier", "part"), values, group)
             continue
         own = replace(own, kind="i8") if field.kind == "?" else own
-        result.column(own, ("point",), [1 * getattr(point, field.name) for point in found.points], group)
+        result.column(own, ("point",), [own.read(point) for point in found.points], group)
     inner = f"{group}/special"
     marks = found.special
     result.axis(inner, integer("special", "number of the special point"), range(len(marks)))
     for field in fields.SPECIAL:
         own = replace(field, units=units or "1") if field.units == "of the key" else field
-        result.column(own, ("special",), [getattr(mark, field.name) for mark in marks], inner)
+        result.column(own, ("special",), [field.read(mark) for mark in marks], inner)
 
 
 def _finite(number: float) -> float:

@@ -125,15 +125,13 @@ def _null_vector(s: NDArray[np.float64], square: complex) -> Complex:
 
 def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
     """The modes, the one that grows fastest (decays slowest) first; a pair of eigenvalues is one mode."""
-    values, vectors = eigensystem(c, contact_stiffness, grip)
+    return modes_of(*eigensystem(c, contact_stiffness, grip))
+
+
+def modes_of(values: Complex, vectors: Complex) -> list[Mode]:
+    """The modes with these eigenvalues and vectors, in this order."""
     found = [_mode(value, vector) for value, vector in zip(values, vectors.T, strict=True) if value.imag >= 0.0]
     return sorted(found, key=lambda mode: -mode.growth)
-
-
-def first_mode(values: Complex, vectors: Complex) -> Mode:
-    """The first of the modes with these eigenvalues and vectors."""
-    first = max((i for i in range(len(values)) if values[i].imag >= 0.0), key=lambda i: values[i].real)
-    return _mode(values[first], vectors[:, first])
 
 
 def _mode(value: Any, vector: Complex) -> Mode:
