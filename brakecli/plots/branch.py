@@ -1,6 +1,7 @@
 """Branches along a key: amplitude above, frequency below; stable motions full, unstable ones dashed."""
 
 import math
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
@@ -26,12 +27,36 @@ _MARKERS = {
     "branch point": "P",
     "grazing stick": "v",
     "grazing flight": "d",
-    "end": "|",
     "budget": "x",
 }
 _SLIDING = "steady sliding"
-_DRAWN = ("amplitude", "frequency", "stick_fraction", "contact_loss_fraction")
+_QUANTITIES = {  # the words at their axis
+    "amplitude": "amplitude of x",
+    "amplitude_y": "amplitude of y",
+    "amplitude_vx": "amplitude of ẋ",
+    "mean_x": "mean of x",
+    "mean_y": "mean of y",
+    "frequency": "frequency",
+    "stick_fraction": "stick fraction",
+    "contact_loss_fraction": "contact loss fraction",
+}
+_SHORT = {"x": "amplitude", "y": "amplitude_y", "vx": "amplitude_vx", "mean": "mean_x"}
 _WIDE = 30.0  # ratio of amplitudes from which on their axis is logarithmic
+_BELOW = 0.4  # of the least amplitude: there steady sliding stands on a logarithmic axis, on which 0 has no place
+
+
+@dataclass(frozen=True)
+class _Branch:
+    """A branch: its motions in columns, and its special points."""
+
+    kind: str
+    columns: dict[str, style.Array]
+    marks: dict[str, style.Array]
+
+    @property
+    def slides(self) -> bool:
+        """Whether it is steady sliding."""
+        return self.kind == _SLIDING
 
 
 def draw(result: StoredResult, variable: str = "") -> Figure:
@@ -39,89 +64,77 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
 
     Raises UsageError where there is no motion at all, or no such number, and UnreadableResultError.
     """
-    upper_name = variable or "amplitude"
-    names = ("value", "stable", *dict.fromkeys(("frequency", upper_name)))
-    if upper_name not in _DRAWN:
+    above = _SHORT.get(variable, variable) or "amplitude"
+    if above not in _QUANTITIES:
         what = f"{argument('variable')} {variable}: is no number of branches that is drawn"
-        raise UsageError(f"{result.path}: {what}; give one of {', '.join(_DRAWN)}")
+        raise UsageError(f"{result.path}: {what}; give one of {', '.join((*_SHORT, *_QUANTITIES))}")
     groups = sorted(
         (name for name in result.groups if name.startswith("branch_") and "/" not in name), key=_number
     )
-    attributes = result.attributes
-    branches = []
-    for group in groups:
-        columns = {name: np.asarray(result.read(group, name), float) for name in names}
-        kind = str(result.group_attributes(group).get("kind", ""))
-        if kind == _SLIDING and len(columns["value"]):
-            cut = _other_mode(columns["frequency"], np.asarray(result.read(group, "multipliers"), float))
-            columns = {name: np.insert(each, cut, each[cut]) for name, each in columns.items()}
-            columns["frequency"][cut + np.arange(len(cut))] = np.nan
-        inner = f"{group}/special"
-        marks = {name: result.read(inner, name) for name in ("kind", "value", "amplitude", "frequency")}
-        columns = _with_ends(columns, marks)
-        branches.append((kind, columns, marks))
-    if not groups or not any(len(columns["value"]) for _, columns, _ in branches):
+    names = dict.fromkeys((above, "frequency"))
+    branches = [_read(result, group, [*names]) for group in groups]
+    values = np.concatenate([np.zeros(0), *(each.columns["value"] for each in branches)])
+    if not len(values):
         raise UsageError(f"{result.path}: holds no motion, so there is nothing to draw")
-    units = style.unit_of(result.variables(groups[0])["value"].attributes)
+    known = result.variables(groups[0])
+    attributes = result.attributes
+    lines = str(attributes.get("title", "")), str(attributes.get("sentence", ""))
+    figure = style.headed(_WIDTH, _HEIGHT, *lines, hspace=0.05)
+    heights = [1.6, 1.0][: len(names)]
+    panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
+    for axes, name in zip(panels, names, strict=True):
+        _panel(axes, branches, name, style.unit_of(known[name].attributes))
+        for threshold, text in (("critical", "squeals by itself"), ("coexists_from", "can vibrate")):
+            value = attributes.get(threshold)
+            if isinstance(value, int | float) and math.isfinite(value):
+                label = f"{text} from {value:.4g} on"
+                axes.axvline(float(value), color=style.GREY, lw=1.1, ls=style.DOTS, zorder=1.5, label=label)
     key = str(attributes.get("parameter", ""))
-    sentence = str(attributes.get("sentence", ""))
-    figure = style.headed(_WIDTH, _HEIGHT, str(attributes.get("title", "")), sentence, hspace=0.05)
-    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=[1.6, 1.0])
-    sizes = np.concatenate([np.zeros(0), *(each[upper_name] for kind, each, _ in branches if kind != _SLIDING)])
-    sizes = sizes[sizes > 0.0]
-    wide = upper_name == "amplitude" and len(sizes) > 0 and sizes.max() > _WIDE * sizes.min()
-    shown = set[str]()
-    for number, (kind, columns, marks) in enumerate(branches):
-        colour = style.DARK if kind == _SLIDING else _COLOURS[(number - 1) % len(_COLOURS)]
-        upper.plot([], [], color=colour, lw=1.8, label=kind)
-        for axes, name in ((upper, upper_name), (lower, "frequency")):
-            if not (wide and axes is upper and kind == _SLIDING):
-                _line(axes, columns, name, colour)
-            _marks(axes, marks, name, colour, shown if axes is upper else None, wide and kind == _SLIDING)
-    if not all(columns["stable"].all() for _, columns, _ in branches):
-        upper.plot([], [], color=style.GREY, lw=1.2, ls=style.DASHES, label="unstable")
-    if wide:
-        upper.set_yscale("log")
-    for name, text in (("critical", "squeals by itself"), ("coexists_from", "can vibrate")):
-        value = attributes.get(name)
-        if isinstance(value, int | float) and math.isfinite(value):
-            for axes in (upper, lower):
-                look: dict[str, Any] = {"label": f"{text} from {value:.4g} on"} if axes is upper else {}
-                axes.axvline(float(value), color=style.GREY, lw=1.1, ls=style.DOTS, zorder=1.5, **look)
-    low = float(sizes.min()) if wide else 0.0
-    unit = style.unit_of(result.variables(groups[0])[upper_name].attributes)
-    words = "amplitude of x" if upper_name == "amplitude" else upper_name.replace("_", " ")
-    style.set_ticks(upper.yaxis, low, style.largest(sizes), unit, words)
-    frequencies = np.concatenate([columns["frequency"] for _, columns, _ in branches])
-    style.set_ticks(lower.yaxis, 0.0, style.largest(frequencies), "Hz", "frequency")
-    values = np.concatenate([columns["value"] for _, columns, _ in branches])
-    style.set_ticks(lower.xaxis, float(values.min()), float(values.max()), units, key)
+    units = style.unit_of(known["value"].attributes)
+    style.set_ticks(panels[-1].xaxis, float(values.min()), float(values.max()), units, key)
     figure.align_ylabels()
-    upper.legend(loc="best")
+    shown = style.labels(panels[:1])
+    panels[0].legend(shown.values(), shown.keys(), loc="best")
     return figure
+
+
+def _read(result: StoredResult, group: str, names: list[str]) -> _Branch:
+    """A branch; raises UsageError where its file is too old for one of these numbers."""
+    known = result.variables(group)
+    if lacking := [name for name in names if name not in known]:
+        problem = f"its branches have no {lacking[0]}, which older versions did not compute"
+        raise UsageError(f"{result.path}: {problem}; follow them again, with brakecli branch")
+    inner = f"{group}/special"
+    columns = {name: style.read_column(result, name, group).astype(float) for name in ("value", "stable", *names)}
+    there = [name for name in ("kind", "value", *names) if name in result.variables(inner)]
+    marks = {name: style.read_column(result, name, inner) for name in there}
+    kind = str(result.group_attributes(group).get("kind", ""))
+    return _Branch(kind, _with_ends(columns, marks), marks)
+
+
+def _panel(axes: Axes, branches: list[_Branch], name: str, unit: str) -> None:
+    """One number of all motions."""
+    drawn = np.concatenate([each.columns[name] for each in branches])
+    sizes = np.concatenate([np.zeros(0), *(each.columns[name] for each in branches if not each.slides)])
+    sizes = sizes[sizes > 0.0]
+    floor = -np.inf
+    if name.startswith("amplitude") and len(sizes) and sizes.max() > _WIDE * sizes.min():
+        axes.set_yscale("log")
+        floor = _BELOW * float(sizes.min())
+    for number, branch in enumerate(branches):
+        colour = style.DARK if branch.slides else _COLOURS[(number - 1) % len(_COLOURS)]
+        label = branch.kind + ", amplitude 0" * (branch.slides and floor > 0.0)
+        axes.plot([], [], color=colour, lw=1.8, label=label)
+        _line(axes, {**branch.columns, name: np.maximum(branch.columns[name], floor)}, name, colour)
+        _marks(axes, branch.marks, name, colour, floor)
+    if not all(each.columns["stable"].all() for each in branches):
+        axes.plot([], [], color=style.GREY, lw=1.2, ls=style.DASHES, label="unstable")
+    style.set_ticks(axes.yaxis, max(floor, 0.0), style.largest(drawn), unit, _QUANTITIES[name])
 
 
 def _number(group: str) -> int:
     digits = group.rpartition("_")[2]
     return int(digits) if digits.isdigit() else 0
-
-
-def _other_mode(frequency: style.Array, multipliers: style.Array) -> style.Array:
-    """The places of steady sliding at which another mode is the least stable one than at the place before.
-
-    Multipliers are those of a period of the least stable mode, so that their angles say how far the other one is.
-    Modes change places only where they are equally stable: between both places the gap of their moduli closes, as
-    fast as it changes beside them. After flutter it stays open, and their frequencies are nearly the same.
-    """
-    angles = np.abs(np.arctan2(multipliers[..., 1], multipliers[..., 0])).max(axis=1) / (2.0 * np.pi)
-    before = frequency[:-1]
-    after = frequency[1:]
-    apart = (angles * frequency)[:-1]
-    other = np.minimum(np.abs(after - before - apart), np.abs(after - before + apart))
-    gap = np.ptp(np.hypot(multipliers[..., 0], multipliers[..., 1]), axis=1)
-    beside = np.pad(np.abs(np.diff(gap)), 1)
-    closes = gap[:-1] + gap[1:] <= 2.0 * np.maximum(beside[:-2], beside[2:]) + 1e-9  # rounding
-    return 1 + np.flatnonzero(closes & (other < np.abs(after - before)))
 
 
 def _with_ends(columns: dict[str, Any], marks: dict[str, Any]) -> dict[str, Any]:
@@ -148,23 +161,11 @@ def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str) -> None:
         axes.plot(columns["value"][inside], columns[name][inside], color=colour, **look)
 
 
-def _marks(
-    axes: Axes, marks: dict[str, Any], name: str, colour: str, shown: set[str] | None, hidden: bool
-) -> None:
-    """The special points, where they have this number; each kind is named once in the legend."""
+def _marks(axes: Axes, marks: dict[str, Any], name: str, colour: str, floor: float) -> None:
+    """The special points, where they have this number."""
     if name not in marks:
         return
     for kind, value, height in zip(marks["kind"], marks["value"], marks[name], strict=True):
-        if str(kind) not in _MARKERS or str(kind) == "end" or (hidden and name == "amplitude") or height <= 0.0:
-            continue
-        label = None if shown is None or str(kind) in shown else str(kind)
-        if shown is not None:
-            shown.add(str(kind))
-        look: dict[str, Any] = {
-            "marker": _MARKERS[str(kind)],
-            "ms": 5.5,
-            "mfc": "white",
-            "ls": "none",
-            "zorder": 3.0,
-        }
-        axes.plot([float(value)], [float(height)], color=colour, label=label, **look)
+        if (marker := _MARKERS.get(str(kind))) and np.isfinite(height) and (name != "frequency" or height > 0.0):
+            look: dict[str, Any] = {"marker": marker, "ms": 5.5, "mfc": "white", "ls": "none", "zorder": 3.0}
+            axes.plot([float(value)], [max(float(height), floor)], color=colour, label=str(kind), **look)

@@ -77,7 +77,7 @@ def draw(result: StoredResult) -> Figure:
         for axes in panels if floor > low else ():
             band: dict[str, Any] = {"color": style.GREY, "alpha": 0.2, "lw": 0, "zorder": 0.5}
             axes.axhspan(low, floor, label="within the reference's error", **band)
-    found = style.labels(figure)
+    found = style.labels(figure.axes)
     look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
     look["loc"] = "outside lower left" if style.is_narrow() else "outside right center"
     figure.legend(found.values(), found.keys(), **look)

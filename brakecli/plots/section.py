@@ -21,6 +21,8 @@ WAVE = "wave"
 KINDS = ("stick", "slip", "turn", "lift-off", "touch")
 _WITH_THE_WHEEL = KINDS[:3]  # where vx is the wheel's speed
 _FEWEST = 8  # samples in a period between which a state is certain
+_SPREAD = 0.01  # of the motion: dots that spread further fill the axes; others are one dot on the motion
+_ROOM = 0.54  # of the spread of the dots, to each side of their middle
 _STATE = ("x", "y", "vx", "vy")
 _Points = dict[str, style.Array]
 
@@ -49,14 +51,23 @@ def draw(result: StoredResult, section: str) -> Figure:
     title = case_of(result).case.title or "Case without a title"
     figure = style.headed(10.4, 4.6, title, f"Poincaré section {where}   ·   {count}", columns=2, wspace=0.05)
     pairs = (("x", "y"), ("x", "vy")) if section in _WITH_THE_WHEEL else (("x", "vx"), ("y", "vy"))
+    spreads = {name: (float(np.ptp(points[name])), float(np.ptp(last[name]))) for name in _STATE}
     for axes, pair in zip(style.panels(figure, 1, 2).flat, pairs, strict=True):
-        looks = [scaled(name, last[name], np.r_[last[name], points[name]]) for name in pair]
+        near = any(spread > _SPREAD * whole for spread, whole in map(spreads.__getitem__, pair))
+        shown = points if near else last
+        looks = [scaled(name, shown[name], np.r_[last[name], points[name]]) for name in pair]
         motion, dots = (
             [look(found[name]) for name, look in zip(pair, looks, strict=True)] for found in (last, points)
         )
-        axes.plot(*motion, color=style.GREY, lw=0.4, label="motion", rasterized=True)
+        axes.plot(*motion, color=style.GREY, lw=0.4, alpha=0.6 if near else 1.0, label="motion", rasterized=True)
         axes.plot(*dots, color=style.BLUE, ls="none", marker=".", label="section")
         axes.set(xlabel=looks[0].label, ylabel=looks[1].label, xlim=looks[0].limits, ylim=looks[1].limits)
+        for name, look, values, limit in zip(pair, looks, dots, (axes.set_xlim, axes.set_ylim), strict=True):
+            if near:
+                spread, whole = spreads[name]
+                middle = 0.5 * float(values.min() + values.max())
+                half = look.factor * max(_ROOM * spread, 0.5 * _SPREAD * whole)
+                limit(middle - half, middle + half)
     return figure
 
 

@@ -3,7 +3,7 @@
 import math
 import textwrap
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
@@ -139,10 +139,10 @@ def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Array:
     return np.asarray(figure.subplots(rows, columns, squeeze=False, **options))
 
 
-def labels(figure: Figure) -> dict[str, Any]:
-    """What the panels label, each label once, with the artist that has it."""
+def labels(panels: Iterable[Axes]) -> dict[str, Any]:
+    """What panels label, each label once, with the artist that has it."""
     found: dict[str, Any] = {}
-    for axes in figure.axes:
+    for axes in panels:
         for artist, label in zip(*axes.get_legend_handles_labels(), strict=True):
             found.setdefault(label, artist)
     return found

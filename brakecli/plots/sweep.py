@@ -192,7 +192,7 @@ def shades(count: int) -> style.Array:
 
 def add_legend(figure: Figure) -> None:
     """Add all labels in as few rows as fit between the heading and the panels."""
-    artists = style.labels(figure)
+    artists = style.labels(figure.axes)
     if not artists:
         return
     texts = sorted(artists, key=lambda text: _FIRST.index(text) if text in _FIRST else len(_FIRST))
