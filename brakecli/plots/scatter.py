@@ -1,5 +1,7 @@
 """A study of scatter: probabilities with their intervals, what decides, and how the numbers are distributed."""
 
+import textwrap
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -7,11 +9,14 @@ from matplotlib.figure import Figure
 from brakecli.files.read import StoredResult
 from brakecli.files.stability_fields import PROBABLE
 from brakecli.plots import style
+from brakecli.plots.run import case_of
 
 # inches; of a bar; bins of a histogram, at most
 _WIDTH = 9.6
 _ROW = 0.36
 _BINS = 40
+_LONG = 22  # characters of a line of a name
+CRITICAL = "critical_friction"
 _SQUEALS = style.VERMILION
 _OTHERS = style.BLUE
 
@@ -40,7 +45,10 @@ def draw(result: StoredResult) -> Figure:
     else:
         upper[1].set_visible(False)
     for axes, (name, (values, whose)) in zip(lower, columns.items(), strict=False):
-        _histogram(axes, values, name, style.unit_of(known[name].attributes), whose)
+        shown = {"": values}
+        if name == CRITICAL:
+            shown = {"critical": values, "own": _own_friction(result)}
+        _histogram(axes, shown, name, style.unit_of(known[name].attributes), whose)
     for axes in lower[len(columns) :]:
         axes.set_visible(False)
     return figure
@@ -51,7 +59,7 @@ def _columns(result: StoredResult) -> dict[str, tuple[style.Array, str]]:
     found = dict[str, tuple[style.Array, str]]()
     known = result.variables("/")
     squeals = style.read_column(result, "squeal") == 1 if "squeal" in known else np.zeros(0, np.bool_)
-    for name in ("critical_friction", "frequency" if squeals.any() else "growth_rate", "amplitude"):
+    for name in (CRITICAL, "frequency" if squeals.any() else "growth_rate", "amplitude"):
         if name in known and len(found) < 2:
             values = style.read_column(result, name)
             only = name in ("frequency", "amplitude") and squeals.any()
@@ -63,13 +71,22 @@ def _columns(result: StoredResult) -> dict[str, tuple[style.Array, str]]:
     return found
 
 
+def _own_friction(result: StoredResult) -> style.Array:
+    """The friction of the brakes themselves: of each sample, or of all where it does not scatter."""
+    for name, each in result.variables("/").items():
+        if "friction.coefficient" in str(each.attributes.get("long_name", "")).split(", "):
+            return style.read_column(result, name)
+    return np.array([case_of(result).case.friction.coefficient])
+
+
 def _probabilities(axes: Axes, names: list[str], value: style.Array, low: style.Array, high: style.Array) -> None:
     """A bar for each outcome, with its interval."""
     places = np.arange(len(names))[::-1]
     colours = [_SQUEALS if name == "squeal" else _OTHERS for name in names]
     off = np.clip(np.array([value - low, high - value]), 0.0, None)
     axes.barh(places, value, height=0.62, color=colours, xerr=off, error_kw={"ecolor": style.DARK, "capsize": 3.0})
-    axes.set_yticks(places, labels=[PROBABLE.get(name, name) for name in names], parse_math=False)
+    texts = [textwrap.fill(PROBABLE.get(name, name), _LONG) for name in names]
+    axes.set_yticks(places, labels=texts, parse_math=False)
     axes.set_xlim(0.0, min(1.0, 1.1 * float(high.max())) or 1.0)
     axes.xaxis.set_major_formatter(lambda each, _: f"{100.0 * each:.3g} %")
     axes.set_title("probability, with its 95 % interval")
@@ -101,19 +118,28 @@ def _tornado(axes: Axes, result: StoredResult, of: str) -> None:
     axes.legend(loc="lower right")
 
 
-def _histogram(axes: Axes, values: style.Array, name: str, units: str, whose: str) -> None:
-    """How many samples have a number about so large; the median is marked."""
-    low, high = np.quantile(values, (0.005, 0.995))
-    inside = values[(values >= low) & (values <= high)]
-    axes.hist(inside, bins=min(_BINS, 5 + int(len(inside) ** 0.5)), color=_OTHERS, alpha=0.85)
-    middle = float(np.median(values))
-    axes.axvline(
-        middle,
-        color=style.DARK,
-        lw=1.1,
-        ls=style.DOTS,
-        label=f"median {style.readable(middle, 4)} {units}".rstrip(),
-    )
-    style.set_ticks(axes.xaxis, float(inside.min()), float(inside.max()), units, name.replace("_", " "))
+def _histogram(axes: Axes, shown: dict[str, style.Array], name: str, units: str, whose: str) -> None:
+    """How many samples have a number about so large, with the medians; what is the same for all is a line.
+
+    Several numbers have the same bins, so that their bars lie over each other.
+    """
+    inside = {}
+    for label, values in shown.items():
+        low, high = np.quantile(values, (0.005, 0.995))
+        inside[label] = values[(values >= low) & (values <= high)]
+    every = np.concatenate([*inside.values()])
+    edges = np.histogram_bin_edges(every, min(_BINS, 5 + int(max(map(len, inside.values())) ** 0.5)))
+    for (label, values), colour in zip(shown.items(), (_OTHERS, style.ORANGE), strict=False):
+        middle = float(np.median(values))
+        number = f"{style.readable(middle, 4)} {units}".rstrip()
+        same = bool(np.ptp(values) == 0.0)
+        text = ", ".join(filter(None, (label, f"{number} of all" if same else f"median {number}")))
+        if not same:
+            axes.hist(inside[label], edges, color=colour, alpha=0.7, label=text)
+            text = ""
+        axes.axvline(middle, color=style.DARK, lw=1.3, ls=style.DASHES if same else style.DOTS, label=text)
+    words = "friction coefficient" if len(shown) > 1 else name.replace("_", " ")
+    style.set_ticks(axes.xaxis, float(every.min()), float(every.max()), units, words)
     axes.set_ylabel(whose)
-    axes.legend(loc="best")
+    style.make_room(axes)
+    axes.legend(loc="upper right", ncols=len(shown))
