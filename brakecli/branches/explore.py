@@ -198,7 +198,9 @@ class Explorer:
         for change in changes:
             if change.kind != "flutter" or self._over():
                 continue
-            if any(mark.kind == "flutter" and mark.motion.value == self.line.value(change.p) for mark in self._marks()):
+            if any(
+                mark.kind == "flutter" and mark.motion.value == self.line.value(change.p) for mark in self._marks()
+            ):
                 continue  # a branch from another flutter has ended here
             problem = self._problem()
             first = sliding.vibration(problem, change)

@@ -1,7 +1,6 @@
 """The picture of a comparison: error against time, and against work that is the same on every machine."""
 
 import math
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -12,22 +11,19 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from brakecli.errors import UsageError
 from brakecli.files.read import StoredResult
 from brakecli.plots import style
-from brakecli.solver.schemes import SCHEMES
+from brakecli.plots.run import case_of
 
 Columns = dict[str, style.Array]  # over the entries; errors that cannot be drawn are NaN
 LARGEST = 3.0  # entries with larger errors are useless as results; they are not drawn
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
-_NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "nodes", "on_front")
+_NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "on_front")
 _PANELS = (  # column, factor, title and label of the work
     ("wall_seconds", 1e3, "Work–precision", "median time of the loop (ms)"),
     ("contact_evaluations", 1.0, "Work counted, the same on every machine", "evaluations of the contact force"),
 )
-_MARKERS = {"0.5, 0.5": "o", "1, 0.5": "^", "0.5, 1": "v", "1, 1": "s"}  # by weights: of two layers
-_MARKERS |= {"0.25, 0.5, 0.25": "o", "0.0833333, 0.833333, 0.0833333": "D", "": "*"}  # of three, and none
-# colours of the exact contact force, of entries on nodes alone
-_EXACT = "#CC79A7"
-_OTHER_NODES = "#56B4E9"
-_NODE_MARKERS = "<>ph"  # markers of the same weights with other numbers of nodes
+_OTHERS = "other methods"
+_COLOURS = (style.BLUE, style.VERMILION, style.ORANGE, "#CC79A7", "#56B4E9", style.DARK)
+_MARKERS = "osD^vP*"  # of named methods, in turn: of another length than the colours
 
 
 def draw(result: StoredResult) -> Figure:
@@ -47,12 +43,14 @@ def draw(result: StoredResult) -> Figure:
     drawn = (columns["error"] > 0.0) & (columns["error"] <= LARGEST)
     errors = columns["error"]
     columns["error"] = np.where(drawn, columns["error"], np.nan)
+    asked = _asked(columns, result)
+    named = _named(columns, best, target, asked)
     rows = _PANELS if np.isfinite(columns["wall_seconds"]).any() else _PANELS[1:]
     figure = style.headed(12.4, 6.6, heading, *lines, columns=len(rows), wspace=0.04)
     panels = style.panels(figure, 1, len(rows), sharey=True)[0]
     for axes, (name, factor, title, label) in zip(panels, rows, strict=True):
         work = np.where(drawn & (columns[name] > 0.0), factor * columns[name], np.nan)
-        _draw_errors(axes, columns, work)
+        _draw_errors(axes, columns, work, named, asked)
         if target > 0.0:
             axes.axhline(
                 target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=f"target {target:g}"
@@ -78,6 +76,7 @@ def draw(result: StoredResult) -> Figure:
             band: dict[str, Any] = {"color": style.GREY, "alpha": 0.2, "lw": 0, "zorder": 0.5}
             axes.axhspan(low, floor, label="within the reference's error", **band)
     found = style.labels(figure.axes)
+    found = {**{name: artist for name, artist in found.items() if name != _OTHERS}, **found}
     look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
     look["loc"] = "outside lower left" if style.is_narrow() else "outside right center"
     figure.legend(found.values(), found.keys(), **look)
@@ -101,41 +100,55 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
     return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts.items() if count])
 
 
-def _draw_errors(axes: Axes, columns: Columns, work: style.Array) -> None:
-    """The error of every method over its work, in the order of the file.
+def _named(columns: Columns, best: int | None, target: float, asked: str) -> list[str]:
+    """The methods that have a name in the picture: what the case asks for, what is recommended, and the front.
 
-    The colour shows the scheme, the marker its weights, a hollow marker the paper's start, and dashes the fixed
-    point iteration. Colour and marker also tell methods apart that differ in the contact force only.
+    Of the front those that meet the target, or all where none does.
     """
+    methods = columns["method"]
+    front = columns["on_front"] == 1
+    good = front & (columns["error"] <= target)
+    best_of_all = [] if best is None else [methods[best]]
+    named = [*best_of_all, *methods[good if good.any() else front].tolist()]
+    return [*dict.fromkeys([*([asked] if asked else []), *named])]
+
+
+def _asked(columns: Columns, result: StoredResult) -> str:
+    """The method that the case itself asks for, on the contact that all others have; empty where it is none of them."""
+    solver = case_of(result).case.solver
+    theta = ", ".join(f"{weight:.6g}" for weight in solver.theta or ())
+    asked = {"scheme": solver.scheme, "theta": theta, "start": solver.start, "iteration": solver.iteration}
+    same = np.all([columns[name] == value for name, value in asked.items()], axis=0)
+    return str(columns["method"][same][0]) if same.any() else ""
+
+
+def _draw_errors(axes: Axes, columns: Columns, work: style.Array, named: list[str], asked: str) -> None:
+    """The error of every method over its work, in the order of the file; those without a name are grey."""
     axes.set(xscale="log", yscale="log")
-    usual = Counter(columns["nodes"].tolist()).most_common(1)[0][0]
-    others = sorted({*columns["nodes"].tolist()} - {0, usual})
-    for label in dict.fromkeys(columns["method"].tolist()):
-        places = columns["method"] == label
+    for method in dict.fromkeys(columns["method"].tolist()):
+        places = columns["method"] == method
         if np.isnan(work[places]).all():
             continue
-        entry = {name: values[places][0] for name, values in columns.items()}
-        scheme = SCHEMES.get(entry["scheme"])
-        colour, own = (scheme.colour, scheme.own_steps) if scheme else (style.GREEN, False)
-        marker = _MARKERS.get(entry["theta"], "P")
-        if entry["evaluator"] == "exact" and not own:
-            colour = _EXACT
-        elif entry["evaluator"] in ("midpoint", "cells"):
-            place = others.index(entry["nodes"]) % len(_NODE_MARKERS) if entry["nodes"] in others else -1
-            colour = _OTHER_NODES
-            marker = _NODE_MARKERS[place] if place >= 0 else "X"
-        size, width, above = (9.0, 2.0, 3.0) if own else (5.0, 1.1, 2.0)
-        face = "white" if entry["start"] == "paper" else colour
-        dashes = (0, (2, 1.5)) if entry["iteration"] == "fixed-point" else "-"
-        look: dict[str, Any] = {"label": label, "color": colour, "marker": marker, "mfc": face, "ls": dashes}
-        axes.plot(work[places], columns["error"][places], ms=size, lw=width, zorder=above, **look)
+        look: dict[str, Any] = {"color": "#CFCFCF", "marker": ".", "lw": 0.9, "zorder": 1.5, "label": _OTHERS}
+        if method in named:
+            number = named.index(method)
+            colour = _COLOURS[number % len(_COLOURS)]
+            label = f"{method}, of the case" if method == asked else method
+            look = {
+                "color": colour,
+                "marker": _MARKERS[number % len(_MARKERS)],
+                "label": label,
+                "zorder": 2.5,
+                "ms": 6.0,
+            }
+        axes.plot(work[places], columns["error"][places], **look)
 
 
 def _draw_front(axes: Axes, columns: Columns, work: style.Array) -> None:
     """The entries that no other beats in both error and time."""
     by_work = np.argsort(work, kind="stable")  # NaN at the end
     on = by_work[columns["on_front"][by_work] == 1]
-    look: dict[str, Any] = {"color": style.GREY, "alpha": 0.45, "lw": 8.0, "solid_capstyle": "round"}
+    look: dict[str, Any] = {"color": style.GREEN, "alpha": 0.25, "lw": 8.0, "solid_capstyle": "round"}
     axes.plot(work[on], columns["error"][on], zorder=0.9, label="no other is better in both", **look)
 
 

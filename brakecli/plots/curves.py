@@ -52,11 +52,10 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", marker=marker, ms=ms, ls=ls)
     regained = picture["critical_status"][0] == Outcome.REGAINED
     if critical.method == "simulation":
-        found = "by simulation" if _simulated(picture) else "with its error bar"
+        found = "by simulation" if _simulated(picture) else "critical value"
         for chosen, face, label in ((~regained, style.BLUE, found), (regained, "white", "stable above")):
             if (there := chosen & np.isfinite(value)).any():
-                error = picture["critical_error"][0][there]
-                axes.errorbar(x[there], value[there], error, mfc=face, label=label, **_bars(size))
+                axes.plot(x[there], value[there], "o", color=style.BLUE, mfc=face, ms=size, label=label)
     elif regained.any():
         axes.plot(x[regained], value[regained], "o", mfc="white", mec=style.DARK, label="stable above")
     low = picture["critical_windows_lower"][0]
@@ -78,6 +77,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
         style.widen(axes, drawn)
     else:
         axes.set_ylim(critical.lower, critical.upper)
+    if critical.method == "simulation":
+        _bars(axes, x, value, error, size)
     _mark(axes, x, picture.missing())
 
 
@@ -94,12 +95,14 @@ def _draw_difference(axes: Axes, picture: SweepPicture) -> None:
     x = picture.axes[0].values
     difference = (picture["critical"] - picture["critical_eigenvalue"])[0]
     error = np.where(np.isfinite(difference), picture["critical_error"][0], np.nan)
+    size = sweep.size_of(len(x))
     axes.axhline(0.0, color=style.DARK, lw=1.1)
-    axes.errorbar(x, difference, error, **_bars(sweep.size_of(len(x))))
-    axes.margins(y=0.15)
+    axes.plot(x, difference, "o", color=style.BLUE, ms=size)
     highest = style.largest(np.abs(difference) + error)
     name = "simulation\nless eigenvalue"
     style.set_ticks(axes.yaxis, 0.0, highest, picture.units["critical"], name)
+    style.widen(axes, np.concatenate([difference - error, difference + error, [0.0]]))
+    _bars(axes, x, difference, error, size)
 
 
 def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
@@ -187,5 +190,13 @@ def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:
         )
 
 
-def _bars(size: float) -> dict[str, Any]:
-    return {"fmt": "o", "color": style.BLUE, "ms": size, "capsize": 0.6 * size, "elinewidth": 1.0}
+def _bars(axes: Axes, x: style.Array, value: style.Array, error: style.Array, size: float) -> None:
+    """Error bars that reach beyond dots of a size (1/72 inch); of the others the legend says how large they are."""
+    low, high = axes.get_ylim()
+    height = 72.0 * axes.get_window_extent().height / axes.figure.dpi
+    seen = error * height > 0.5 * size * (high - low)
+    look: dict[str, Any] = {"fmt": "none", "ecolor": style.BLUE, "capsize": 0.6 * size, "elinewidth": 1.0}
+    if seen.any():
+        axes.errorbar(x[seen], value[seen], error[seen], label="error bar", **look)
+    if hidden := style.largest(error[~seen & np.isfinite(value)]):
+        axes.plot([], [], " ", label=f"errors up to {style.readable(hidden, 2)} lie within the dots")

@@ -6,17 +6,20 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from brakecli.analysis.regime.decision import Regime
+from brakecli.analysis.signals.bursts import Burst
 from brakecli.analysis.signals.look import Measurand, SignalLook
 from brakecli.analysis.spectrum import segment
 from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style
-from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, envelope
+from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, ROOM, envelope
 
 _VELOCITY = {
     Measurand.FORCE: ("rate of the force", "N/s"),
     Measurand.TORQUE: ("rate of the torque", "N m/s"),
     Measurand.PRESSURE: ("pressure", "Pa"),
 }
+FAINT = 1e-6  # of the largest density: what is fainter adds nothing to the axis of a burst
 _LABELLED = 4  # bursts whose frequency is written into the record
 
 
@@ -82,11 +85,9 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     gap = float(np.median(np.diff(look.slips.places))) if look.slips.count > 1 else 0.0
     cycle = 1.0 / (frequency * step) if frequency else gap
     wanted = int(min(CYCLES * cycle or FEW, MOST_DETAIL, len(values)))
-    tones = sorted(look.verdict.bursts, key=lambda tone: tone.energy)
-    slips = look.verdict.regime == "relaxation"
     middle = 0.5 * len(values)
-    if tones and not slips:
-        middle = 0.5 * (tones[-1].start + tones[-1].end) / step - offset
+    if burst := _strongest(look):
+        middle = 0.5 * (burst.start + burst.end) / step - offset
     first = int(np.clip(middle - 0.5 * wanted, 0, len(values) - wanted))
     factor, unit = style.prefixed(style.largest(values[first : first + wanted]), unit)
     time = step * (offset + np.arange(first, first + wanted))
@@ -104,25 +105,44 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     style.set_ticks(axes.xaxis, time[0], time[-1], "s", "time")
 
 
+def _strongest(look: SignalLook) -> Burst | None:
+    """The burst that the verdict is about; None where it is about the whole record."""
+    if look.verdict.regime == Regime.RELAXATION:
+        return None
+    return max(look.verdict.bursts, key=lambda burst: burst.energy, default=None)
+
+
 def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
+    """The spectrum of the record; that of a burst alone reaches as far as it stands out."""
     from scipy.signal import welch
 
     values = look.signal.values
+    step = look.signal.interval
     frequency = look.verdict.frequency
+    title = f"Spectrum of the {look.quantity}"
+    burst = _strongest(look)
+    if burst:
+        values = values[int(burst.start / step) : int(burst.end / step)]
+        frequency = frequency or burst.frequency
+        title += f" from {burst.start:.4g} to {burst.end:.4g} s"
     good = np.flatnonzero(np.isfinite(values))
     filled = np.interp(np.arange(len(values)), good, values[good])
-    size = segment(len(filled))
-    frequencies, density = welch(filled, 1.0 / look.signal.interval, nperseg=size, detrend="constant")
+    frequencies, density = welch(filled, 1.0 / step, nperseg=segment(len(filled)), detrend="constant")
     shown = (frequencies > 0.0) & (density > 0.0)
     scale, label = style.density(density, frequencies, MEASURED_UNITS[look.quantity])
     density *= scale
-    axes.loglog(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
-    axes.set(title=f"Spectrum of the {look.quantity}", ylabel=label)
+    (axes.semilogy if burst else axes.loglog)(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
+    axes.set(title=title, ylabel=label)
     if shown.any() and style.largest(density) < style.WIDE * density[shown].min():
         style.set_ticks(axes.yaxis, *axes.get_ylim())
     low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
+    if burst:
+        low = 0.0
+        loud = frequencies[density > FAINT * style.largest(density)]
+        high = min(high, max(ROOM * float(loud.max(initial=0.0)), 2.0 * burst.frequency))
+        axes.set_xlim(low, high)
     style.set_ticks(axes.xaxis, low, high, "Hz", "frequency")
     if frequency is not None:
-        label = f"{'events' if look.verdict.regime == 'relaxation' else 'line'} {frequency:.4g} Hz"
+        label = f"{'events' if look.verdict.regime == Regime.RELAXATION else 'line'} {frequency:.4g} Hz"
         axes.axvline(frequency, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)
         axes.legend(loc="best")

@@ -35,7 +35,7 @@ WIDTH = 8.8  # inches, of a figure with one column of panels
 MOST_PANELS = 5  # values of a third axis: its maps stand side by side
 FORCED_PART = "amplitude_forced"
 ATTRACTOR = "attractor"
-_FIRST = (*map(str, REGIMES), "by simulation", "with its error bar", "by eigenvalues")  # in the legend
+_FIRST = (*map(str, REGIMES), "by simulation", "critical value", "error bar", "by eigenvalues")  # in the legend
 _WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
 Sign = tuple[style.Array, dict[str, Any]]  # points without a value that could be drawn, the look of their marker

@@ -24,7 +24,7 @@ ROWS = {
     ),
     "solver/schemes/__init__.py": (
         '    "event-driven": Scheme(',
-        '    "backward-euler": Scheme("brakecli.solver.steps.backward_euler", (Trial(),), colour="#CC79A7",'
+        '    "backward-euler": Scheme("brakecli.solver.steps.backward_euler", (Trial(),),'
         ' unstable="or take another scheme"),\n',
     ),
     "solver/contact/force.py": (

@@ -107,12 +107,11 @@ class Scheme:
     `theta`: its weights where a case gives none. `sum_is_one`: whether weights must add up to one. `own_steps`: it
     finds its steps itself and keeps a tolerance, so that no step can be unstable, or bias anything. `exact`: its
     steps make no error but rounding, on smooth surfaces alone. `unstable`: what to do where it multiplies
-    disturbances. `colour`: in pictures.
+    disturbances.
     """
 
     module: str
     trials: tuple[Trial, ...]
-    colour: str
     theta: tuple[float, ...] = ()
     sum_is_one: bool = False
     own_steps: bool = False
@@ -131,7 +130,6 @@ SCHEMES: dict[str, Scheme] = {
             Trial((1.0, 1.0)),
             Trial(HALF, iteration="fixed-point"),
         ),
-        colour="#0072B2",
         theta=HALF,
         unstable="or take weights that add up to 1 or more, such as [0.5, 0.5]",
     ),
@@ -144,18 +142,13 @@ SCHEMES: dict[str, Scheme] = {
             Trial(NUMEROV, start="paper"),
             Trial(QUARTERS, start="paper", iteration="fixed-point"),
         ),
-        colour="#D55E00",
         theta=QUARTERS,
         sum_is_one=True,
         starts=("consistent", "paper"),
         unstable="or take theta = [0.25, 0.5, 0.25]",
     ),
-    "event-driven": Scheme(
-        "brakecli.solver.schemes.event_driven", (Trial(contacts=True),), colour="#222222", own_steps=True
-    ),
-    "piecewise-exact": Scheme(
-        "brakecli.solver.schemes.piecewise_exact", (Trial(),), colour="#6A3D9A", own_steps=True, exact=True
-    ),
+    "event-driven": Scheme("brakecli.solver.schemes.event_driven", (Trial(contacts=True),), own_steps=True),
+    "piecewise-exact": Scheme("brakecli.solver.schemes.piecewise_exact", (Trial(),), own_steps=True, exact=True),
 }
 
 
