@@ -147,6 +147,7 @@ def plot(
 def report(
     *results: "Result",
     output: "str | PathLike[str] | None" = None,
+    full: bool = False,
     progress: "Progress" = False,
     force: bool = False,
     force_read: bool = False,
@@ -156,16 +157,18 @@ def report(
     Args:
         results: what other functions gave, or paths of results: of runs, sweeps, comparisons, stability with
             `vary`, branches or scatter.
-        output: the page to write, .html; none if left out.
+        output: the page to write, .html or .pdf; none if left out.
+        full: add the case, the evidence, accuracy, warnings, and how to repeat it.
         progress: as for `run`.
         force: replace that file if it exists.
         force_read: look at results whose digest does not fit; the page says so.
 
     Returns:
-        The page, HTML that is complete in itself.
+        The page as HTML that is complete in itself, also where a PDF is written.
 
     Raises:
-        UsageError, UnreadableResultError, CannotWriteError: as `brakecli report`; also where jinja2 is missing.
+        UsageError, UnreadableResultError, CannotWriteError: as `brakecli report`; also where jinja2 is missing,
+            or weasyprint for a PDF.
     """
     if not results:
         raise UsageError("report: there is no result; give one or more")
@@ -180,8 +183,7 @@ def report(
         from brakecli.runs.limits import within_range
 
         with within_range():
-            write_report(files, path, force=force, progress=tell)
-        return path.read_text(encoding="utf-8")
+            return write_report(files, path, full=full, force=force, progress=tell)
 
 
 def diff(

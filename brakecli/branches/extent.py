@@ -31,7 +31,7 @@ UNKNOWN = Extent(None, None, None, None)
 
 
 def extent(begins: Sequence[Array], period: float, events: Iterable[float], pieces: int, carry: Carry) -> Extent:
-    """That of a motion whose period is cut into equal parts that begin with some states, each in so many pieces."""
+    """The extent of a motion whose period is cut into parts, which begin with some states, in so many pieces."""
     length = period / len(begins)
     middles = np.fromiter(events, float)
     low = np.full(2, np.inf)

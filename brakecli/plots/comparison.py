@@ -114,7 +114,7 @@ def _named(columns: Columns, best: int | None, target: float, asked: str) -> lis
 
 
 def _asked(columns: Columns, result: StoredResult) -> str:
-    """The method that the case itself asks for, on the contact that all others have; empty where it is none of them."""
+    """The method that the case itself asks for, on the usual contact; empty where it is none of them."""
     solver = case_of(result).case.solver
     theta = ", ".join(f"{weight:.6g}" for weight in solver.theta or ())
     asked = {"scheme": solver.scheme, "theta": theta, "start": solver.start, "iteration": solver.iteration}

@@ -191,7 +191,7 @@ def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:
 
 
 def _bars(axes: Axes, x: style.Array, value: style.Array, error: style.Array, size: float) -> None:
-    """Error bars that reach beyond dots of a size (1/72 inch); of the others the legend says how large they are."""
+    """Error bars that reach beyond dots of a size (1/72 inch); how large others are, the legend says."""
     low, high = axes.get_ylim()
     height = 72.0 * axes.get_window_extent().height / axes.figure.dpi
     seen = error * height > 0.5 * size * (high - low)

@@ -34,9 +34,9 @@ def plot_result(
 def plot_two(first: Path, second: Path, target: Path, *, force: bool, variable: str = "") -> None:
     """Draw the curves of two results of one kind over each other; raises what `plot_result` raises."""
     with _opened(target, first, second, force=force) as (write, stored):
-        from brakecli.plots import two
+        from brakecli.plots import over_each_other
 
-        write(two.draw((stored[0], stored[1]), variable))
+        write(over_each_other.draw((stored[0], stored[1]), variable))
 
 
 def plot_signal(look: "SignalLook", source: str, target: Path, *, force: bool) -> "Figure":

@@ -17,7 +17,7 @@ from brakecli.sweeps.result import unit
 from brakecli.views.render import Renderer
 
 Numbers = Mapping[str, tuple[Any, str]]
-"""What two results are compared by: values with their units, by their names."""
+"""What results are compared by: values with their units, by their names."""
 
 # of a picture: a third of the bytes, and no difference that could be seen
 _COLOURS = 255
@@ -83,14 +83,14 @@ class Part:
     answer: Sequence[str]
     picture: Picture | None
     change: Sequence[Any]  # blocks that say what to change
-    sections: Sequence[Section]
+    sections: Callable[[], Sequence[Section]]
     numbers: Numbers
     versions: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Pair:
-    """Two results beside each other, named by what differs: pictures of both together, or one of each."""
+class Beside:
+    """Results beside each other, named by what differs: a picture of all together, or one of each."""
 
     title: str
     names: Sequence[str]

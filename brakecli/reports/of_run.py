@@ -61,16 +61,6 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     found = result.attributes
     loaded = case_of(result)
     advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_WORK), loaded.case)
-    again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
-    left_out = sentences(f"Left out: {each}" for each in found.get("left_out", ()))
-    sections = [
-        Section("Case", case_blocks(loaded)),
-        Section("Stability of steady sliding", [*_stability(advice)]),
-        Section("Regime, and its evidence", _regime(result)),
-        Section("Accuracy", [*_accuracy(result), Texts([*sentences(found.get("adjustments", ())), *left_out])]),
-        Section("Warnings", [Texts(sentences(found.get("warnings", ())) or ["There are none."])]),
-        Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
-    ]
     theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
     said = {**found, "vibrations": _vibrations(result), "evidence": result.group_attributes("regime/evidence")}
     answer = [motion_sentence(said, PAGE, full=True), theory]
@@ -80,7 +70,24 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     numbers = {**numbers, **numbers_of(named(ADVICE, "critical_friction", "margin"), advice.numbers())}
     drawn = picture(PICTURE, partial(draw, result))
     change = [*_to_change(advice, found.get("regime"))]
+    sections = partial(_appendix, result, loaded, advice)
     return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions)
+
+
+def _appendix(result: StoredResult, loaded: LoadedCase, advice: AdviceReport) -> list[Section]:
+    """What the first page leaves out."""
+    found = result.attributes
+    again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
+    left_out = sentences(f"Left out: {each}" for each in found.get("left_out", ()))
+    notes = Texts([*sentences(found.get("adjustments", ())), *left_out])
+    return [
+        Section("Case", case_blocks(loaded)),
+        Section("Stability of steady sliding", [*_stability(advice)]),
+        Section("Regime, and its evidence", _regime(result)),
+        Section("Accuracy", [*_accuracy(result), notes]),
+        Section("Warnings", [Texts(sentences(found.get("warnings", ())) or ["There are none."])]),
+        Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
+    ]
 
 
 def _to_change(advice: AdviceReport, regime: Any) -> Iterator[Any]:
@@ -133,7 +140,7 @@ def case_blocks(loaded: LoadedCase) -> list[Any]:
 
 def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
     """The commands that give the result, and this page, again; and the file that it was computed from."""
-    report = f"brakecli report {escaped(shlex.quote(result.path.name))} -o report.html"
+    report = f"brakecli report {escaped(shlex.quote(result.path.name))} --full -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
 

@@ -1,7 +1,7 @@
 """The parts of a page about sweeps, comparisons of schemes, stability along a key, branches, and scatter."""
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,7 +12,7 @@ from brakecli.analysis.regime.decision import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError, escaped
 from brakecli.files import fields
-from brakecli.files.field import Field
+from brakecli.files.field import Field, named
 from brakecli.files.read import StoredResult
 from brakecli.files.stability_fields import (
     BRANCH,
@@ -52,6 +52,7 @@ from brakecli.sweeps.record import Status
 
 MOST_FAILURES = 20
 _NONE_AT_0 = ("error", "amplitude", "frequency")  # of a special point: 0 says that there is none
+_SPECIAL = ("kind", "value", "error", "amplitude", "frequency", "reason")
 _TEXTS = ("regime", "excitation", "critical_status", "sustained_status", "reason")
 _ERRORS = ("estimated_error", "critical_error", "critical_bias", "unconverged_steps")
 _IDLE = ("settled", "settled_from", "steps", "contact_evaluations", "unconverged_steps", "warning_count")
@@ -87,18 +88,22 @@ def part_of_sweep(result: StoredResult) -> Part:
     try:
         found = gather(result, more=[*names, *(name for name in _ERRORS if name in known)])
     except UsageError as error:  # more axes than a picture has, or none
-        return _plain(result, "sweep", [f"{str(error).removeprefix(f'{result.path}: ')}."], None, [], {})
+        return _plain(result, "sweep", [f"{str(error).removeprefix(f'{result.path}: ')}."], None, list, {})
     sweep = found.critical
     question = _QUESTIONS["sweep"] if sweep is None else _QUESTIONS["critical"].format(sweep.parameter)
-    points: list[Any] = [*maps(found, names)]
-    if not points:
-        points.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
     drawn = picture(f"Picture of the sweep: {found.summary}", partial(draw, result))
     said, numbers = _answer(found)
     answer = [*said, *(f"{each[:1].upper()}{each[1:]}." for each in found.findings)]
+    return _plain(result, "sweep", answer, drawn, partial(_points, result, found, names), numbers, question)
+
+
+def _points(result: StoredResult, found: SweepPicture, names: list[str]) -> list[Section]:
+    """The points of a sweep with all their values, their errors and warnings."""
+    points: list[Any] = [*maps(found, names)]
+    if not points:
+        points.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
     axes = [(axis.key, f"{len(axis.values)} values", f"{axis.text(0)} to {axis.text(-1)}") for axis in found.axes]
     grid = Table(axes, ("key", "values", "from, to"))
-    sections = [Section("Points and their values", [grid, *points])]
     errors = {name: np.asarray(found.variables.get(name, np.nan), float) for name in _ERRORS}
     accuracy = [
         (name.replace("_", " "), shown(float(np.nanmax(np.abs(values))), found.units[name]))
@@ -106,14 +111,16 @@ def part_of_sweep(result: StoredResult) -> Part:
         if np.isfinite(values).any()
     ]
     table = Table(accuracy or [("error", "not estimated")], ("number", "largest"))
-    sections.append(Section("Accuracy", [table]))
     failed = np.ravel(np.asarray(result.read("/", "status")) != Status.DONE)
     reasons = np.ravel(result.read("/", "reason"))
     warned = np.ravel(result.read("/", "warning"))
     lines = [f"Failed: {reason}." for reason in dict.fromkeys(reasons[failed].tolist())][:MOST_FAILURES]
     lines += [f"{warning}." for warning in dict.fromkeys(warned[warned != ""].tolist())][:MOST_FAILURES]
-    sections.append(Section("Warnings", [Texts(lines or ["There are none."])]))
-    return _plain(result, "sweep", answer, drawn, sections, numbers, question)
+    return [
+        Section("Points and their values", [grid, *points]),
+        Section("Accuracy", [table]),
+        Section("Warnings", [Texts(lines or ["There are none."])]),
+    ]
 
 
 def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
@@ -163,7 +170,6 @@ def part_of_other(result: StoredResult) -> Part:
         for each in declared.get(kind, fields.COMPARISON)
         if each.name not in apart and each.in_file
     ]
-    tables = [Table(PAGE.rows(known, result.attributes))]
     numbers = numbers_of(known, result.attributes)
     drawn = picture(_PICTURES[kind], partial(draw, result))
     answer = ["No entry meets the wanted error."]
@@ -174,13 +180,14 @@ def part_of_other(result: StoredResult) -> Part:
     if kind in ("branch", "scatter"):
         sentence = str(result.attributes.get("sentence", ""))
         answer = [f"{sentence[:1].upper()}{sentence[1:]}."]
+    tables = [Table(PAGE.rows(known, result.attributes))]
+    study = list[Section]()
     if kind == "branch":
         tables.append(_special(result))
-    sections = [Section("Numbers", tables)]
     if kind == "scatter":
         said, tables_of_study = _study(result)
         answer.append(said)
-        sections.insert(0, Section("Study", tables_of_study))
+        study = [Section("Study", tables_of_study)]
         names = OUTCOME, *PROBABILITY
         rows = [(PROBABLE.get(name, name), *more) for name, *more in _rows(result, "/", names)]
         tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
@@ -194,7 +201,7 @@ def part_of_other(result: StoredResult) -> Part:
         method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))
         steps = f"steps of {shown(float(step), 's')}" if np.isfinite(step) else "its own steps"
         answer = [f"Recommended: {method} with {steps}, whose error is {error:.2g}."]
-    return _plain(result, kind, answer, drawn, sections, numbers)
+    return _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", tables)], numbers)
 
 
 def _study(result: StoredResult) -> tuple[str, list[Table]]:
@@ -259,7 +266,7 @@ def _special(result: StoredResult) -> Table:
     for group in sorted(groups, key=lambda each: (len(each), each)):  # branch_10 comes after branch_9
         branch = group.removesuffix("/special")
         which = f"{branch.replace('_', ' ')}, {result.group_attributes(branch).get('kind', '')}"
-        rows += [(which, *row) for row in _rows(result, group, SPECIAL)]
+        rows += [(which, *row) for row in _rows(result, group, named(SPECIAL, *_SPECIAL))]
     return Table(rows, ("branch", "special point", "at", "error", "amplitude of x", "frequency", "why"))
 
 
@@ -281,22 +288,26 @@ def _plain(
     kind: str,
     answer: list[str],
     drawn: Picture | None,
-    sections: list[Section],
+    sections: Callable[[], list[Section]],
     numbers: Numbers,
     question: str = "",
 ) -> Part:
     """A part with what is said of every result."""
-    loaded = case_of(result)
     attributes = result.attributes
-    given = str(attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", ""))
-    again = repeat(result, f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5", given)
-    again += [Texts(["CASE.toml holds the whole case, which stands above as a file."])] * (
-        "CASE" in _COMMANDS[kind]
-    )
-    sections += [Section("Case", case_blocks(loaded)), Section("How to repeat it", again)]
+
+    def every() -> list[Section]:
+        given = str(
+            attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", "")
+        )
+        again = repeat(result, f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5", given)
+        if "CASE" in _COMMANDS[kind]:
+            again.append(Texts(["CASE.toml holds the whole case, which stands above as a file."]))
+        case = Section("Case", case_blocks(case_of(result)))
+        return [*sections(), case, Section("How to repeat it", again)]
+
     title = str(attributes.get("title", "")) or "Result without a title"
     name = escaped(result.path.name)
     asks = question or _QUESTIONS[kind]
     what = "This names the keys of such a case to change, and to which values:"
     change = [Texts([what]), Code(_ADVISE[kind])] if kind in _ADVISE else []
-    return Part(name, title, asks, answer, drawn, change, sections, numbers, result.versions)
+    return Part(name, title, asks, answer, drawn, change, every, numbers, result.versions)

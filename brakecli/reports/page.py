@@ -2,7 +2,8 @@
 
 import base64
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -21,19 +22,24 @@ if TYPE_CHECKING:
 LARGEST = 3_000_000  # bytes
 
 
-def write_report(results: Sequence[Path], target: Path, *, force: bool, progress: "Counted") -> None:
-    """Write the page of some results.
+def write_report(
+    results: Sequence[Path], target: Path, *, full: bool = False, force: bool, progress: "Counted"
+) -> str:
+    """Write the page of some results, which is given back as HTML: their answers, or `full` all that is known.
 
-    Raises UsageError for another suffix, an existing target without `force`, a page that would be too large, and
-    where a library is missing; UnreadableResultError; CannotWriteError.
+    Two or three results of one kind share a page. Raises UsageError for another suffix, an existing target without
+    `force`, a page that would be too large, and where a library is missing; UnreadableResultError;
+    CannotWriteError.
     """
-    check_target(target, "a page", (".html", ".htm"), results)
+    check_target(target, "a page", (".html", ".htm", ".pdf"), results)
     with installed("matplotlib", "jinja2"):
         import jinja2
         import matplotlib.figure  # noqa: F401
+    printed = _printer() if target.suffix.lower() == ".pdf" else str.encode
+    from brakecli.plots.over_each_other import MOST
     from brakecli.reports.of_run import part_of_run
+    from brakecli.reports.of_several import beside
     from brakecli.reports.of_sweep import part_of_other, part_of_sweep
-    from brakecli.reports.of_two import pair_of
 
     def part(stored: StoredResult) -> "Part":
         kind = str(stored.attributes.get("kind"))
@@ -44,18 +50,16 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
             raise UsageError(f"{stored.path}: {what}")
         return part_of_sweep(stored) if kind == "sweep" else part_of_other(stored)
 
-    with new_output(target, force=force) as file:
+    with new_output(target, force=force) as file, ExitStack() as stack:
         parts = []
-        pair = None
+        opened = []
         for number, result in enumerate(results):
             progress("results", number, len(results))
-            with open_result(result) as stored:
-                parts.append(part(stored))
-        if len(results) == 2:
-            with open_result(results[0]) as a, open_result(results[1]) as b:
-                pair = pair_of((a, b), parts)
-        if pair:
-            parts = [replace(part, title=title) for part, title in zip(parts, pair.titles, strict=True)]
+            opened.append(stack.enter_context(open_result(result)))
+            parts.append(part(opened[-1]))
+        together = beside(opened, parts, full) if 2 <= len(results) <= MOST else None
+        if together:
+            parts = [replace(part, title=title) for part, title in zip(parts, together.titles, strict=True)]
         script = _file("report.js")
         loader = jinja2.FunctionLoader(_file)
         environment = jinja2.Environment(
@@ -64,14 +68,34 @@ def write_report(results: Sequence[Path], target: Path, *, force: bool, progress
         environment.policies["json.dumps_kwargs"] = {"ensure_ascii": False}  # in order, and short
         digest = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
         page = environment.get_template("report.html").render(
-            parts=parts, pair=pair, script=script, digest=digest, version=__version__, mark=readings.mark()
+            parts=parts,
+            together=together,
+            full=full,
+            script=script,
+            digest=digest,
+            version=__version__,
+            mark=readings.mark(),
         )
-        data = page.encode()
+        data = printed(page)
         if len(data) >= LARGEST:
             problem = f"the page would have {len(data) / 1e6:.1f} MB, and {LARGEST / 1e6:.0f} MB are the limit"
             raise UsageError(f"{target}: {problem}; name fewer results, and write several pages")
         file.write(data)
         file.publish()
+        return str(page)
+
+
+def _printer() -> Callable[[str], bytes]:
+    """What makes a PDF of a page; raises UsageError where it, or a library of the system for it, is missing."""
+    try:
+        with installed("weasyprint"):
+            import weasyprint
+    except OSError as error:
+        what = f"weasyprint finds no library of the system that it needs ({printable(str(error).splitlines()[0])})"
+        remedy = "install Pango, as with: apt install libpango-1.0-0 libpangoft2-1.0-0; or write an .html file"
+        raise UsageError(f"{what}; {remedy}") from error
+    alone = weasyprint.urls.URLFetcher(allowed_protocols=["data"])
+    return lambda page: bytes(weasyprint.HTML(string=page, url_fetcher=alone).write_pdf())
 
 
 def _file(name: str) -> str:

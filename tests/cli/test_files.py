@@ -17,7 +17,7 @@ from brakecli.case.read import parse_case
 from brakecli.files import fields
 from brakecli.files.contents import INFO, Difference, difference
 from brakecli.files.read import open_result
-from brakecli.plots import two
+from brakecli.plots import over_each_other
 from brakecli.runs.run import run
 from brakecli.views.view import sentence
 from tests.campaign import campaign
@@ -466,7 +466,7 @@ def test_two_results_are_drawn_over_each_other(folder: Path, tmp_path: Path, nam
 
 def test_the_spectra_of_two_runs_have_the_unit_of_their_motion_and_envelopes_reach_its_end(folder: Path) -> None:
     with open_result(folder / "a.h5") as a, open_result(folder / "b.h5") as b:
-        motion, whole, spectra = two.draw((a, b), "vx").axes
+        motion, whole, spectra = over_each_other.draw((a, b), "vx").axes
     unit = motion.get_ylabel().rpartition("(")[2].rstrip(")")
     assert unit == "mm/s"
     assert f"(({unit})²/Hz)" in spectra.get_ylabel()

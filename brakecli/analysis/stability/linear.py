@@ -19,9 +19,9 @@ from brakecli.analysis.stability.modes import (
     Mode,
     damping_matrix,
     eigensystem,
-    modes_of,
     first_order,
     is_undamped,
+    modes_of,
     stiffness_matrix,
 )
 from brakecli.solver.alike import at_once

@@ -9,7 +9,7 @@ import pytest
 from brakecli.case.read import parse_case
 from brakecli.errors import UsageError
 from brakecli.files.read import open_result
-from brakecli.plots import style, two
+from brakecli.plots import over_each_other, style
 from brakecli.runs.run import run
 from tests.campaign import campaign
 from tests.commands import TINY
@@ -18,7 +18,7 @@ from tests.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
 
 def picture(names: list[Path], variable: str = "") -> Any:
     with style.applied(), open_result(names[0]) as first, open_result(names[1]) as second:
-        figure = two.draw((first, second), variable)
+        figure = over_each_other.draw((first, second), variable)
         style.rendered(figure, ".png")
         return figure
 
@@ -67,7 +67,7 @@ def test_results_over_several_axes_or_over_different_ones_have_no_curves(tmp_pat
     one, other, several = (write(tmp_path / f"{n}.h5", table) for n, table in enumerate(tables))
     with pytest.raises(UsageError, match="only numbers along one axis"):
         picture([several, several])
-    with pytest.raises(UsageError, match="amplitude is not a number along the same axes in both"):
+    with pytest.raises(UsageError, match="amplitude is not a number along the same axes in all of them"):
         picture([one, other])
     with pytest.raises(UsageError, match="regime is not a number"):
         picture([one, one], "regime")
