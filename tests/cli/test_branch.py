@@ -2,6 +2,8 @@
 
 import subprocess
 import sys
+import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,12 +13,19 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import brakecli
+from brakecli.branches.explore import Explorer
 from brakecli.errors import UsageError
+from brakecli.files.field import Field, integer
 from brakecli.files.read import open_result
+from brakecli.files.stability_fields import MOTION
+from brakecli.files.write import new_result
+from brakecli.front.inputs import load_case
 from brakecli.plots.branch import _line, _with_ends
 from brakecli.plots.result import draw
-from brakecli.plots.style import DARK, applied
+from brakecli.plots.style import BLUE, DARK, applied
+from brakecli.runs.branch import line_of
 from tests.analysis.shoes import Shoe
+from tests.branches.phasewise import Phasewise
 from tests.campaign import campaign
 from tests.commands import ROOT, environment
 from tests.commands import brakecli as command
@@ -24,6 +33,10 @@ from tests.commands import brakecli as command
 pytestmark = pytest.mark.usefixtures("compiled")
 
 FRICTION = ("--parameter", "friction.coefficient=0:1")
+
+
+def quiet(what: str, done: int, total: int) -> None:
+    """No progress."""
 
 
 def answer_of(here: Path, *words: str) -> dict[str, Any]:
@@ -47,8 +60,6 @@ def found(here: Path) -> dict[str, Any]:
 
 def test_the_starter_can_vibrate_below_its_critical_friction(here: Path, found: dict[str, Any]) -> None:
     """Critical friction against the roots of Hurwitz' polynomial, and the fold below it."""
-    import tomllib
-
     shoe = Shoe.of(tomllib.loads((here / "branch.toml").read_text()))
     assert shoe.critical is not None
     assert found["critical"] == pytest.approx(shoe.critical, rel=1e-9)
@@ -93,7 +104,7 @@ def test_the_file_holds_what_json_says_and_opens_in_xarray(here: Path, found: di
         group = f"branch_{number}"
         with xr.open_dataset(here / "branch.h5", group=group, engine="h5netcdf") as data:
             assert data.attrs["kind"] == branch["kind"]
-            for name in ("value", "amplitude", "frequency", "stick_fraction", "contact_loss_fraction", "stable"):
+            for name in (*(field.name for field in MOTION), "stable"):
                 assert data[name].values.tolist() == [point[name] for point in branch["points"]]
             first = [pair for pair in data["multipliers"].values[0].tolist() if not np.isnan(pair[0])]
             assert first == branch["points"][0]["multipliers"]
@@ -119,7 +130,106 @@ def test_steady_sliding_is_full_up_to_its_flutter_and_dashed_beyond(here: Path, 
     assert dashed.get_xdata()[-1] == 1.0
     refused = command("plot", "branch.h5", "--variable", "none", cwd=here)
     refused.told(
-        2, "--variable none: is no number of branches that is drawn; give one of amplitude, frequency, stick"
+        2, "--variable none: is no number of branches that is drawn; give one of x, y, vx, mean, amplitude"
+    )
+
+
+@pytest.mark.parametrize("variable", ["", "vx"])
+def test_steady_sliding_stands_at_the_foot_of_a_logarithmic_axis(
+    variable: str, here: Path, found: dict[str, Any]
+) -> None:
+    with open_result(here / "branch.h5") as stored, applied():
+        upper, _ = draw(stored, variable=variable).axes
+    assert upper.get_yscale() == "log"
+    low, _ = upper.get_ylim()
+    lines: list[Any] = [each for each in upper.get_lines() if len(each.get_xdata()) > 1]
+    sliding = [each.get_ydata() for each in lines if each.get_color() == DARK]
+    others = np.concatenate([each.get_ydata() for each in lines if each.get_color() == BLUE])
+    assert len(sliding) == 2  # stable, and beyond flutter
+    assert len({height for each in sliding for height in each}) == 1
+    assert low < sliding[0][0] < others.min()
+    assert "steady sliding, amplitude 0" in [text.get_text() for text in upper.get_legend().get_texts()]
+
+
+def test_the_extent_and_the_means_of_motions_are_those_of_another_scheme(
+    here: Path, found: dict[str, Any]
+) -> None:
+    """A cubic misses (2 π / 64)^4 / 384 = 2.4e-7 of a sine; the samples of the other scheme miss more.
+
+    Those of y and vx, 40 to the fastest period, miss up to (π / 40)² / 2 = 3.1e-3 of an extreme. The mean of 400
+    samples of a motion with kinks is wrong by a part of (2 π / 400)² / 12 = 2e-5.
+    """
+    shoe = Shoe.of(tomllib.loads((here / "branch.toml").read_text()))
+    explorer = Explorer(
+        line_of(load_case(str(here / "branch.toml"), None), ("friction.coefficient",), 0.0, 1.0, "it"), quiet
+    )
+    cycles = explorer.explore().branches[1]
+    assert cycles.branch is not None
+    for place in (0, len(cycles.points) // 2, len(cycles.points) - 1):
+        motion = cycles.points[place].motion
+        cycle = cycles.branch.points[place].facts
+        other = Phasewise(replace(shoe, phi=motion.value))
+        way = other(np.array(cycle.state), cycle.period)
+        sizes = 0.5 * (way.high - way.low)
+        told = motion.extent()
+        assert told.amplitude_y == pytest.approx(sizes[1], rel=3.1e-3)
+        assert told.amplitude_vx == pytest.approx(sizes[2], rel=3.1e-3)
+        states = [np.array(cycle.state)]
+        for _ in range(400):
+            states.append(other(states[-1], cycle.period / 400).end)
+        means = np.mean(states[1:], axis=0)
+        assert told.mean_x == pytest.approx(means[0], abs=2e-5 * motion.amplitude)
+        assert told.mean_y == pytest.approx(means[1], abs=2e-5 * sizes[1])
+    for point in found["branches"][0]["points"][::8]:
+        assert (point["amplitude_y"], point["amplitude_vx"]) == (0.0, 0.0)
+        rest = replace(shoe, phi=point["value"]).rest
+        assert (point["mean_x"], point["mean_y"]) == pytest.approx((rest[0], rest[1]), rel=1e-9)
+
+
+def test_the_frequency_of_steady_sliding_does_not_jump_where_another_mode_decays_more_slowly(
+    tmp_path: Path,
+) -> None:
+    """Of this pad the lower mode decays more slowly at first, and the upper one flutters.
+
+    The modes come from the equations of the page on the model. The upper one comes down to the lower one.
+    """
+    command("new", "pad", cwd=tmp_path).told(0)
+    answer = answer_of(tmp_path, "branch", "pad.toml", "--parameter", "friction.coefficient=0:1")
+    sliding, cycle = answer["branches"]
+    shoe = Shoe.of(tomllib.loads((tmp_path / "pad.toml").read_text()))
+    frequencies = []
+    for point in sliding["points"]:
+        both = np.abs(replace(shoe, phi=point["value"]).modes.imag) / (2.0 * np.pi)
+        assert np.abs(both - point["frequency"]).min() < 1e-6 * point["frequency"]
+        frequencies.append(point["frequency"])
+    (flutter,) = [mark for mark in sliding["special"] if mark["kind"] == "flutter"]
+    first = replace(shoe, phi=0.0).modes
+    least = abs(first[0].imag) / (2.0 * np.pi)  # the least stable one
+    assert frequencies[0] > 1.1 * least
+    assert frequencies[0] == pytest.approx(np.abs(first.imag).max() / (2.0 * np.pi))
+    stable = [each["frequency"] for each in sliding["points"] if each["stable"]]
+    assert (np.diff([*stable, flutter["frequency"]]) < 0.0).all()  # towards the other mode
+    assert flutter["frequency"] == pytest.approx(cycle["special"][0]["frequency"], rel=1e-3)
+
+
+def test_numbers_that_an_older_file_lacks_are_named_with_the_remedy(
+    here: Path, found: dict[str, Any], tmp_path: Path
+) -> None:
+    older = tmp_path / "older.h5"
+    with new_result(older, force=False) as result:
+        result.set_attributes({"kind": "branch", "parameter": "friction.coefficient"})
+        result.axis("branch_0", integer("point", "number"), range(2))
+        result.set_attributes({"kind": "steady sliding"}, "branch_0")
+        for name in ("value", "amplitude", "frequency", "stable"):
+            result.column(Field(name, "1", name), ("point",), [0.0, 1.0], "branch_0")
+        result.axis("branch_0/special", integer("special", "number"), range(0))
+        for name in ("value", "amplitude", "frequency"):
+            result.column(Field(name, "1", name), ("special",), [], "branch_0/special")
+        result.column(Field("kind", "", "kind", "S16"), ("special",), [], "branch_0/special")
+        result.commit()
+    command("plot", "older.h5", "-o", "a.png", cwd=tmp_path).told(0)
+    command("plot", "older.h5", "-o", "b.png", "--variable", "mean", cwd=tmp_path).told(
+        2, "its branches have no mean_x, which older versions did not compute; follow them again"
     )
 
 
@@ -332,8 +442,6 @@ def test_an_interruption_ends_the_search_for_a_first_motion(tmp_path: Path) -> N
 
 def test_a_shoe_that_locks_is_said_to_lock(here: Path) -> None:
     """Divergence where the determinant cxx (cyy + K) - (cxy + φ K) cxy vanishes; a short range has no flutter."""
-    import tomllib
-
     tables = tomllib.loads((here / "branch.toml").read_text())
     tables["wheel"]["angular_speed"] *= -1.0
     c = Shoe.of(tables).c

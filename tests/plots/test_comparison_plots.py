@@ -38,6 +38,10 @@ METHODS = {
     "event-driven": ("event-driven", "", "consistent", "newton", "auto", 0),
 }  # fmt: skip
 RUNGS = 4
+BEST = "two-layer (1/2, 1/2)"  # recommended, and on the front
+ASKED = "three-layer (1/4, 1/2, 1/4)"  # by the case itself
+OTHERS = [label for label in METHODS if label not in (BEST, ASKED)]
+CASE = parse_case(TINY, "tiny", ['solver.scheme="three-layer"']).resolved
 
 Columns = dict[str, NDArray[Any]]
 
@@ -69,13 +73,21 @@ def write(path: Path, changed: Columns | None = None, **attributes: Any) -> Path
     values = columns() | (changed or {})
     known = {"title": "Größe $x_{", "target_error": 1e-2, "reference_error": 1e-6, "duration": 0.02, "left_out": 0}
     with new_result(path, force=True) as result:
-        result.set_attributes({"kind": "comparison", **known, "recommended": 2} | attributes)
+        about = {"kind": "comparison", "resolved_toml": CASE, "recommended": 2}
+        result.set_attributes(about | known | attributes)
         result.axis("/", Field("entry", "1", "entry"), np.arange(len(values["method"])))
         for name, array in values.items():
             data = np.where(np.isnan(array), FILL, array) if array.dtype.kind == "f" else array
             result.variable("/", Field(name, "1", name), ("entry",), data)
         result.commit()
     return path
+
+
+def curves(axes: Any) -> dict[str, Any]:
+    """The line of each method: those without a name lie in the order of the file."""
+    grey = [each for each in axes.get_lines() if each.get_label() == "other methods"]
+    named = {BEST: line(axes, BEST), ASKED: line(axes, f"{ASKED}, of the case")}
+    return named | dict(zip(OTHERS, grey, strict=True))
 
 
 @pytest.mark.parametrize("suffix", ["png", *(pytest.param(each, marks=campaign) for each in ("pdf", "svg"))])
@@ -97,7 +109,7 @@ def test_curves_are_the_numbers_of_the_file_in_both_panels(tmp_path: Path) -> No
         assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
         for label in METHODS:
             of = values["method"] == label
-            curve = line(axes, label)
+            curve = curves(axes)[label]
             np.testing.assert_allclose(curve.get_xdata(), factor * values[name][of], rtol=1e-12)
             np.testing.assert_array_equal(curve.get_ydata(), values["error"][of])
             checked += 1
@@ -106,17 +118,19 @@ def test_curves_are_the_numbers_of_the_file_in_both_panels(tmp_path: Path) -> No
     assert figure.axes[0].get_xlabel() == "median time of the loop (ms)"
 
 
-def test_every_method_has_a_look_of_its_own(tmp_path: Path) -> None:
-    axes = drawn(write(tmp_path / "r.h5")).axes[0]
-    curves = {label: line(axes, label) for label in METHODS}
-    looks = {
-        (curve.get_color(), curve.get_marker(), curve.get_markerfacecolor(), curve.get_linestyle())
-        for curve in curves.values()
-    }
-    assert len(looks) == len(METHODS)
-    three = [curve for label, curve in curves.items() if label.startswith("three")]
-    assert len({curve.get_color() for curve in three}) == 1
-    assert [curve.get_markerfacecolor() == "white" for curve in three] == [False, True]
+def test_what_is_best_and_what_was_asked_for_have_colours_and_the_rest_is_grey(tmp_path: Path) -> None:
+    found = curves(drawn(write(tmp_path / "r.h5")).axes[0])
+    looks = {label: (curve.get_color(), curve.get_marker()) for label, curve in found.items()}
+    assert len({looks[label] for label in OTHERS}) == 1
+    assert len({looks[label] for label in (BEST, ASKED, OTHERS[0])}) == 3
+    assert all(found[label].get_zorder() > found[OTHERS[0]].get_zorder() for label in (BEST, ASKED))
+
+
+def test_where_no_entry_meets_the_target_the_whole_front_has_names(tmp_path: Path) -> None:
+    place = np.arange(len(METHODS) * RUNGS) // RUNGS
+    changed = {"on_front": (place == 1).astype(int)}
+    axes = drawn(write(tmp_path / "r.h5", changed, target_error=1e-9)).axes[0]
+    assert line(axes, [*METHODS][1]).get_color() != line(axes, BEST).get_color()
 
 
 def test_front_target_and_recommendation_are_marked(tmp_path: Path) -> None:
@@ -131,7 +145,9 @@ def test_front_target_and_recommendation_are_marked(tmp_path: Path) -> None:
         assert line(axes, "recommended").get_ydata() == [values["error"][2]]
     assert line(left, "recommended").get_xdata() == [pytest.approx(1e3 * values["wall_seconds"][2])]
     assert "cheapest of error ≤ 0.01: two-layer (1/2, 1/2), step 2.5e-06 s" in figure.texts[1].get_text()
-    assert set(legend(figure)) == {*METHODS, "target 0.01", "recommended", "no other is better in both"}
+    named = [BEST, f"{ASKED}, of the case"]
+    marks = ["target 0.01", "recommended", "no other is better in both", "other methods"]
+    assert legend(figure) == [*named, *marks]
 
 
 def test_the_legend_covers_no_panel(tmp_path: Path) -> None:
@@ -205,7 +221,8 @@ def test_a_computed_comparison_is_drawn_with_its_own_numbers(tmp_path: Path) -> 
     for label in {method_label(entry.kind) for entry in found.entries}:
         sizes = [e.errors.error for e in found.entries if e.errors and method_label(e.kind) == label]
         assert len(sizes) >= 2
-        np.testing.assert_allclose(line(figure.axes[1], label).get_ydata(), sizes, rtol=1e-12)
+        shown = [np.array(each.get_ydata()) for each in figure.axes[1].get_lines() if len(each.get_xdata()) >= 2]
+        assert any(len(each) == len(sizes) and np.allclose(each, sizes, rtol=1e-12) for each in shown), label
 
 
 def test_what_cannot_be_drawn_is_refused(tmp_path: Path) -> None:

@@ -17,15 +17,27 @@ def test_critical_values_and_their_error_bars_are_those_of_the_file(tmp_path: Pa
     picture = gathered(result)
     axes, below = panels(result)
     np.testing.assert_array_equal(points(axes, "by eigenvalues")[:, 1], picture["critical_eigenvalue"][0])
-    (container,) = axes.containers
-    np.testing.assert_array_equal(container.lines[0].get_ydata(), picture["critical"][0])
+    np.testing.assert_array_equal(points(axes, "by simulation")[:, 1], picture["critical"][0])
+    (container,) = below.containers
     bars = np.array(container.lines[2][0].get_segments())
     np.testing.assert_allclose(np.ptp(bars[:, :, 1], axis=1), 2.0 * picture["critical_error"][0], rtol=1e-9)
     np.testing.assert_array_equal(bars[:, 0, 0], picture.axes[0].values)
-    difference = below.containers[0].lines[0].get_ydata()
-    np.testing.assert_allclose(difference, -1e-4 * np.arange(8), atol=1e-15)
+    np.testing.assert_allclose(bars.mean(axis=1)[:, 1], -1e-4 * np.arange(8), atol=1e-15)
     assert below.get_xlabel() == "link2.angle_deg (deg)"
     assert axes.get_ylabel() == "critical friction.coefficient"
+
+
+def test_error_bars_are_drawn_where_they_reach_beyond_their_dots(tmp_path: Path) -> None:
+    """Critical values fill 0.07 of an axis some 5 inches high: dots of 6.5/72 inch hide errors below 7e-4."""
+    values = columns((8,), critical=True)
+    values["critical_error"] = np.where(np.arange(8) < 5, 1e-4, 5e-3)
+    result = write(tmp_path / "r.h5", {"axis": [ANGLE], "critical": CRITICAL}, values)
+    axes = panels(result)[0]
+    (container,) = axes.containers
+    bars = np.array(container.lines[2][0].get_segments())
+    np.testing.assert_array_equal(bars[:, 0, 0], [6.0, 7.0, 8.0])
+    np.testing.assert_allclose(np.ptp(bars[:, :, 1], axis=1), 1e-2, rtol=1e-9)
+    assert {"error bar", "errors up to 10⁻⁴ lie within the dots"} < set(legend(drawn(result)))
 
 
 @campaign
@@ -73,7 +85,7 @@ def test_a_search_that_no_run_measured_is_not_called_a_simulation(tmp_path: Path
     values["critical"][3] = values["critical_eigenvalue"][3] = np.nan
     result = write(tmp_path / "r.h5", {"axis": [ANGLE], "critical": CRITICAL}, values)
     assert len(panels(result)) == 1
-    assert {"with its error bar", "by eigenvalues"} < set(legend(drawn(result)))
+    assert {"critical value", "by eigenvalues"} < set(legend(drawn(result)))
     assert "by simulation" not in legend(drawn(result))
 
 

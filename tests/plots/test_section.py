@@ -67,6 +67,31 @@ def test_a_motion_that_repeats_is_one_dot_on_its_curve(
         assert np.abs((curve - dots[-1]) / sizes).max(axis=1).min() < 0.05  # from sample to sample
 
 
+@pytest.mark.parametrize("spread", [0.3, 1e-3])
+def test_dots_that_spread_fill_the_axes_and_others_stand_on_the_whole_motion(
+    spread: float, runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A ring of dots whose size is a part of the motion's."""
+    at_waves = sections._at_waves
+    with open_result(runs["forced"]) as result:
+        sizes = {name: np.ptp(result.read("history", name)[-1000:]) for name in ("x", "y", "vx", "vy")}
+
+    def ring(*about: Any) -> Any:
+        found, words = at_waves(*about)
+        turns = np.linspace(0.0, 2.0 * np.pi, len(found["x"]))
+        places = {"x": np.cos(turns), "y": np.cos(turns), "vx": np.sin(turns), "vy": np.sin(turns)}
+        return {name: found[name].mean() + 0.5 * spread * sizes[name] * places[name] for name in sizes}, words
+
+    monkeypatch.setattr(sections, "_at_waves", ring)
+    for axes in section(runs["forced"], "wave"):
+        limits = np.array([axes.get_xlim(), axes.get_ylim()])
+        filling = points(axes, "section" if spread > 0.01 else "motion")
+        shares = np.ptp(filling, axis=0) / np.ptp(limits, axis=1)
+        assert (shares > 0.85).all()  # the margins of Matplotlib leave 1/1.1, those of a section 1/1.08
+        assert (shares < 1.0).all()
+        assert ((limits[:, 0] < filling.min(axis=0)) & (filling.max(axis=0) < limits[:, 1])).all()
+
+
 def test_the_states_at_the_waves_are_those_between_the_samples(runs: dict[str, Path]) -> None:
     """A forced linear motion is a sine: what it is after whole periods follows from a fit to its samples."""
     with open_result(runs["forced"]) as result:

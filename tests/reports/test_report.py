@@ -27,8 +27,8 @@ from brakecli.files.field import Field
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import style
-from brakecli.plots.branch import _other_mode, draw
-from brakecli.reports import blocks, of_run, of_sweep, of_two, page, sweep_map
+from brakecli.plots.branch import draw
+from brakecli.reports import blocks, of_run, of_several, of_sweep, page, sweep_map
 from brakecli.reports.page import write_report
 from brakecli.runs.advise import advise
 from brakecli.runs.run import run
@@ -88,9 +88,9 @@ def rows(html: str) -> list[tuple[bool, list[str]]]:
     return [(bool(mark), row) for (mark, _), row in zip(found, texts, strict=True)]
 
 
-def reported(*results: Path) -> Page:
+def reported(*results: Path, full: bool = True) -> Page:
     target = results[0].with_suffix(".html")
-    write_report(results, target, force=True, progress=quiet)
+    write_report(results, target, full=full, force=True, progress=quiet)
     return Page(target.read_text(encoding="utf-8"))
 
 
@@ -99,11 +99,11 @@ def plain(monkeypatch: pytest.MonkeyPatch) -> None:
     """Pages whose pictures are drawn, but not painted, for tests that look at something else."""
 
     def picture(words: str, draw: Callable[[], Figure]) -> blocks.Picture:
-        if words == of_two.PICTURE:  # it is not known beforehand whether there is one
+        if words == of_several.PICTURE:  # it is not known beforehand whether there is one
             draw()
         return blocks.Picture(words, "data:,wide", "data:,narrow")
 
-    for module in (of_run, of_sweep, of_two):
+    for module in (of_run, of_several, of_sweep):
         monkeypatch.setattr(module, "picture", picture)
 
 
@@ -323,25 +323,6 @@ def test_branches_have_a_sentence_a_picture_and_their_special_points(
     assert flutter[0][4] == "–"  # no motion has an amplitude there
 
 
-def test_a_curve_of_frequency_ends_where_another_mode_is_the_least_stable_one() -> None:
-    """Two modes come near each other; from the third place on the second one is the least stable."""
-    both = np.array([[100.0, 110.0], [101.0, 109.0], [102.0, 108.0], [103.0, 107.0]])
-    least = np.where(np.arange(4) < 2, both[:, 0], both[:, 1])
-    factors = np.exp(2j * np.pi * np.concatenate([both, -both], axis=1) / least[:, None])
-    parts = np.stack([factors.real, factors.imag], axis=-1)
-    assert _other_mode(least, parts).tolist() == [2]
-    assert _other_mode(both[:, 0], parts).tolist() == []
-
-
-def test_a_curve_of_frequency_goes_on_after_flutter_where_both_modes_nearly_have_it() -> None:
-    """Frequencies meet and part by less than they drift; one mode grows, the other one decays."""
-    least = 174.4 + 0.012 * np.arange(9.0)
-    both = np.stack([least, least + 0.01 * (np.arange(9.0) - 4.0)], axis=1)
-    sizes = np.exp(np.stack([0.18 + 0.007 * np.arange(9.0), -0.35 - 0.007 * np.arange(9.0)], axis=1))
-    factors = np.tile(sizes, 2) * np.exp(2j * np.pi * np.concatenate([both, -both], axis=1) / least[:, None])
-    assert _other_mode(least, np.stack([factors.real, factors.imag], axis=-1)).tolist() == []
-
-
 def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) -> None:
     with new_result(tmp_path / "r.h5", force=False) as result:
         known = [Field(name, "1", name) for name in ("parameter", "total")]
@@ -426,7 +407,7 @@ def test_what_cannot_be_reported_is_refused_and_nothing_is_left(
             write_report([result], target, force=force, progress=quiet)
         assert before == {each: each.read_bytes() for each in tmp_path.iterdir()}
 
-    refused(r"ends in \.html", results[0], tmp_path / "r.pdf")
+    refused(r"ends in \.html, \.htm or \.pdf", results[0], tmp_path / "r.txt")
     (tmp_path / "mine.html").write_text("mine")
     refused("--force", results[0], tmp_path / "mine.html")
     refused("the result itself", tmp_path / "mine.html", tmp_path / "mine.html", force=True)
