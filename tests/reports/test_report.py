@@ -260,6 +260,107 @@ def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
     assert not any(marked for marked, _ in rows(alone.html))
 
 
+def test_without_more_being_asked_for_a_page_has_the_answer_alone(
+    results: list[Path], found: Page, plain: None
+) -> None:
+    short = reported(results[0], full=False)
+    assert 'class="appendix"' in found.html
+    assert 'class="appendix"' not in short.html
+    assert [tag for tag, _ in short.found if tag == "h3"] == []
+    assert short.html.count("<figure>") == 1
+    assert "brakecli report --full" in " ".join(short.texts)
+    first = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
+    assert first in " ".join(short.texts)
+
+
+def test_three_results_stand_side_by_side_with_their_changes_against_the_first(
+    tmp_path: Path, compiled: None, plain: None
+) -> None:
+    for name, friction in zip("abc", (0.6, 0.3, 0.75), strict=True):
+        run(parse_case(TINY, "case", [f"friction.coefficient={friction}"]), tmp_path / f"{name}.h5", force=False)
+    short = reported(*(tmp_path / f"{name}.h5" for name in "abc"), full=False)
+    assert len(short.named("article")) == 1
+    heads = re.findall(r"<h2>(.: .*)</h2>", short.html)
+    numbers = (("A", "a", 0.6), ("B", "b", 0.3), ("C", "c", 0.75))
+    assert heads == [f"{letter}: {name}.h5, friction.coefficient = {number:g}" for letter, name, number in numbers]
+    assert short.html.count('<section class="answer">') == 3
+    assert short.html.count("<figure>") == 1  # of all together
+    told = {cells[0]: (marked, cells[1:]) for marked, cells in rows(short.html)}
+    assert told[""] == (False, ["A", "B", "C", "B against A", "C against A"])
+    assert told["friction.coefficient"] == (True, ["0.6", "0.3", "0.75", "−50 %", "+25 %"])  # 0.75 / 0.6 - 1
+    assert all(len({*cells[:3]}) > 1 for name, (_, cells) in told.items() if name)  # what is the same is no news
+    long = reported(*(tmp_path / f"{name}.h5" for name in "abc"))
+    assert len(long.named("article")) == 4
+    assert (False, ["lost contact", "0", "0", "0", "same", "same"]) in rows(long.html)
+
+
+def test_many_changed_keys_are_named_where_a_single_page_has_no_room_for_them(tmp_path: Path, plain: None) -> None:
+    changes = ["shoe.mass=11.0", "friction.coefficient=0.5", "load.force=4e3", "wheel.radius=0.4"]
+    changes += ["link1.stiffness=2e7", "link1.damping=200.0", "link2.damping=200.0"]
+    for name, case in (("a", parse_case(BASE, "case")), ("b", parse_case(BASE, "case", changes))):
+        about: dict[str, Any] = {"title": "T", "resolved_toml": case.resolved, "case_toml": BASE}
+        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": CRITICAL}, **about)
+    pair = [tmp_path / "a.h5", tmp_path / "b.h5"]
+    keys = {change.partition("=")[0] for change in changes}
+    short = reported(*pair, full=False).html
+    shown = {cells[0] for _, cells in rows(short)} & keys
+    (named,) = re.findall(r"<p>Different, too: (.*)\.</p>", short)
+    assert len(shown) == of_several._MOST_KEYS
+    assert shown | {*named.split(", ")} == keys
+    assert {cells[0] for _, cells in rows(reported(*pair).html)} >= keys
+
+
+def test_a_pdf_has_one_page_and_the_same_bytes_again(results: list[Path], tmp_path: Path) -> None:
+    pytest.importorskip("weasyprint")
+    for name in ("a", "b"):
+        write_report([results[0]], tmp_path / f"{name}.pdf", force=False, progress=quiet)
+    data = (tmp_path / "a.pdf").read_bytes()
+    assert data == (tmp_path / "b.pdf").read_bytes()
+    assert data.startswith(b"%PDF")
+
+
+@campaign
+def test_every_kind_of_result_fits_on_one_page_of_a4(results: list[Path], tmp_path: Path, compiled: None) -> None:
+    """So do two and three of them, whatever differs."""
+    weasyprint = pytest.importorskip("weasyprint")
+    case = tmp_path / "c.toml"
+    case.write_text(TINY)
+    study = '[[parameter]]\nkey = "link2.angle_deg"\ndistribution = "uniform"\nlow = 4.0\nhigh = 6.0\n'
+    (tmp_path / "s.toml").write_text(f'case = "c.toml"\nsamples = 64\n{study}')
+    brakecli.scatter(tmp_path / "s.toml", output=tmp_path / "scatter.h5")
+    brakecli.branch(case, parameter={"friction.coefficient": (0.5, 0.8)}, output=tmp_path / "branch.h5")
+    kinds = [*results, tmp_path / "scatter.h5", tmp_path / "branch.h5"]
+    other = tmp_path / "other.h5"
+    changes = ["friction.coefficient=0.3", "shoe.mass=12.0", "link1.stiffness=2e7", "link1.damping=100.0"]
+    run(parse_case(TINY, "case", [*changes, "load.force=4e3", "wheel.radius=0.4"]), other, force=False)
+    several = [[each] * count for each in kinds for count in (1, 2, 3)] + [[results[0], other, results[0]]]
+    for each in several:
+        page = write_report(each, tmp_path / "r.pdf", force=True, progress=quiet)
+        assert len(weasyprint.HTML(string=page).render().pages) == 1, each
+
+
+def test_without_what_makes_a_pdf_the_remedy_is_said(
+    results: list[Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(words: str) -> None:
+        with pytest.raises(UsageError, match=words):
+            write_report([results[2]], tmp_path / "r.pdf", force=False, progress=quiet)
+        assert not (tmp_path / "r.pdf").exists()
+
+    class Broken:
+        """Finds the library, which finds none of the system."""
+
+        def find_spec(self, name: str, *_: Any) -> None:
+            if name == "weasyprint":
+                raise OSError("cannot load library 'libpango-1.0-0': no such file\nAdditionally, ...")
+
+    monkeypatch.setitem(sys.modules, "weasyprint", None)
+    refused("weasyprint cannot be imported .*; install it with: python -m pip install weasyprint")
+    monkeypatch.delitem(sys.modules, "weasyprint")
+    monkeypatch.setattr(sys, "meta_path", [Broken(), *sys.meta_path])
+    refused(r"finds no library of the system that it needs \(cannot load library 'libpango-1.0-0': no such file\)")
+
+
 @campaign
 def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
     results: list[Path], tmp_path: Path, plain: None
@@ -275,7 +376,8 @@ def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
     assert (pictures("a", "b"), pictures("aa", "bb")) == (1, 2)
     both = reported(tmp_path / "a.h5", tmp_path / "b.h5").html
     assert (True, ["critical.lower", "0", "0.1", "differs"]) in rows(both)  # a key of the sweep, not of its case
-    assert pictures("a", "b", "aa") == 0  # of more than two each is alone
+    assert (pictures("a", "b", "a"), pictures("aa", "bb", "aa")) == (1, 3)
+    assert pictures("a", "b", "a", "b") == 0  # of more than three each is alone
     assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
 
 
@@ -449,7 +551,7 @@ def test_a_browser_shows_the_page_at_any_width_without_a_mouse_and_on_paper(
     run(loaded, tmp_path / "relaxation.h5", force=False)
     write(tmp_path / "critical.h5", {"axis": [ANGLE], "critical": CRITICAL}, **origin())
     target = tmp_path / "r.html"
-    write_report([*results, *tmp_path.glob("*.h5")], target, force=False, progress=quiet)
+    write_report([*results, *tmp_path.glob("*.h5")], target, full=True, force=False, progress=quiet)
     with browser() as window:
         for width in (400, 1600):
             window.open(target, width)
@@ -482,6 +584,9 @@ def test_a_browser_shows_the_page_at_any_width_without_a_mouse_and_on_paper(
         for name in ("relaxation", "run"):
             result = tmp_path / "relaxation.h5" if name == "relaxation" else results[0]
             write_report([result], target, force=True, progress=quiet)
+            window.open(target, 1600)
+            assert len(PAGE.findall(window.paper())) == 1
+            write_report([result], target, full=True, force=True, progress=quiet)
             window.open(target, 1600)
             assert 2 <= len(PAGE.findall(window.paper())) <= 6
             assert window.run("document.querySelectorAll('details[open]:has(table)').length") == 2
