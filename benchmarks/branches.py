@@ -61,7 +61,7 @@ def main(number: int = SHOES, seed: int = SEED) -> None:
         ends["gets through" if through else last.reason] += 1
         if not through:
             print(
-                f"shoe {index}: {last.reason}, at {last.value:.6g} ({len(cycles[0].points)} points, {spent:.2f} s)"
+                f"shoe {index}: {last.reason}, at {last.motion.value:.6g} ({len(cycles[0].points)} points, {spent:.2f} s)"
             )
     median = np.median(seconds)
     most = max(seconds)

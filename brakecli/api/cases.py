@@ -128,8 +128,9 @@ def branch(
 ) -> "xr.DataTree":
     """Every motion along a key, stable or not: a tree with a group `branch_0`, `branch_1`, … for each branch.
 
-    The first one is steady sliding. A group holds its motions over `point`: value, amplitude (m), frequency (Hz),
-    whether it is stable, Floquet multipliers; its group `special` holds folds, flips and all that is special.
+    The first one is steady sliding. A group holds its motions over `point`: value, amplitudes of x, y (m) and vx
+    (m/s), means of x and y (m), frequency (Hz), whether it is stable, Floquet multipliers. Its group `special`
+    holds folds, flips and all that is special.
     Attributes of the root are critical, coexists_from, barrier (m), sentence and all else that
     `docs/result-format.md` names.
 

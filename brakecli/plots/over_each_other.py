@@ -141,9 +141,9 @@ def _curves(
     axis = _axis_of(results, names)
     units = {name: style.unit_of(known[name].attributes) for name in (axis, *names)}
     title = str(results[0].attributes.get("title", "")) or "Results beside each other"
-    line = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
+    told = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
     height = 2.8 if in_a_row else 2.2 + 2.3 / len(names)
-    figure, panels = _panels(len(names), height, title, [line], in_a_row)
+    figure, panels = _panels(len(names), height, title, [told], in_a_row)
     places = [style.read_column(result, axis) for result in results]
     for axes, name in zip(panels, names, strict=True):
         columns = [style.read_column(result, name) for result in results]

@@ -128,7 +128,8 @@ def _histogram(axes: Axes, shown: dict[str, style.Array], name: str, units: str,
         low, high = np.quantile(values, (0.005, 0.995))
         inside[label] = values[(values >= low) & (values <= high)]
     every = np.concatenate([*inside.values()])
-    edges = np.histogram_bin_edges(every, min(_BINS, 5 + int(max(map(len, inside.values())) ** 0.5)))
+    count = min(_BINS, 5 + int(max(map(len, inside.values())) ** 0.5))
+    edges = np.histogram_bin_edges(every, count).tolist()
     for (label, values), colour in zip(shown.items(), (_OTHERS, style.ORANGE), strict=False):
         middle = float(np.median(values))
         number = f"{style.readable(middle, 4)} {units}".rstrip()

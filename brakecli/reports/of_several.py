@@ -84,8 +84,8 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
 
 def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:
     """Name, all values, and by how much they differ from the first, of rows that end with the unit."""
-    found = []
-    marked = []
+    found = list[tuple[str, ...]]()
+    marked = list[int]()
     for name, first, *others, units in rows:
         changes = [_change(first, other) for other in others]
         if {*changes} != {_SAME}:

@@ -139,10 +139,10 @@ def test_steady_sliding_stands_at_the_foot_of_a_logarithmic_axis(
     variable: str, here: Path, found: dict[str, Any]
 ) -> None:
     with open_result(here / "branch.h5") as stored, applied():
-        upper, _ = draw(stored, variable=variable).axes
+        upper: Any = draw(stored, variable=variable).axes[0]
     assert upper.get_yscale() == "log"
     low, _ = upper.get_ylim()
-    lines: list[Any] = [each for each in upper.get_lines() if len(each.get_xdata()) > 1]
+    lines = [each for each in upper.get_lines() if len(each.get_xdata()) > 1]
     sliding = [each.get_ydata() for each in lines if each.get_color() == DARK]
     others = np.concatenate([each.get_ydata() for each in lines if each.get_color() == BLUE])
     assert len(sliding) == 2  # stable, and beyond flutter

@@ -33,6 +33,11 @@ def written(path: Path, scattering: str) -> Path:
     return path
 
 
+def texts(axes: Any) -> list[str]:
+    """What the legend says."""
+    return [text.get_text() for text in axes.get_legend().get_texts()]
+
+
 def bars(container: Any) -> tuple[list[float], list[float]]:
     """Left ends and heights."""
     return [bar.get_x() for bar in container], [bar.get_height() for bar in container]
@@ -48,8 +53,7 @@ def test_critical_and_own_friction_have_the_same_bins(tmp_path: Path) -> None:
         inside = values[(values >= low) & (values <= high)]
         assert bars(container)[1] == np.histogram(inside, places)[0].tolist()
         assert sum(bars(container)[1]) == len(inside)  # none lies beyond the bins
-    texts = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert texts == [f"critical, median {np.median(CRITICAL):.4g}", f"own, median {np.median(OWN):.4g}"]
+    assert texts(axes) == [f"critical, median {np.median(CRITICAL):.4g}", f"own, median {np.median(OWN):.4g}"]
     assert axes.get_xlabel() == "friction coefficient"
 
 
@@ -59,6 +63,4 @@ def test_a_friction_that_does_not_scatter_is_a_line(tmp_path: Path) -> None:
     (own,) = [line for line in axes.get_lines() if line.get_label() == "own, 0.6 of all"]
     assert own.get_xdata() == pytest.approx([0.6, 0.6])  # that of the case
     other = drawn(tmp_path / "r.h5").axes[3]
-    assert [text.get_text() for text in other.get_legend().get_texts()] == [
-        f"median {np.median(CRITICAL):.4g} 1/s"
-    ]
+    assert texts(other) == [f"median {np.median(CRITICAL):.4g} 1/s"]

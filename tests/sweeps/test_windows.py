@@ -129,7 +129,7 @@ def listed_ends(tables: dict[str, Any], key: str, range_: tuple[float, float]) -
     width = upper - lower
     critical = Critical(parameter=name, lower=lower, upper=upper, tolerance=1e-3 * width)
     answers = Answers(explored(critical, make(tables, **{key: lower})).explored, None)
-    return on_waves(critical, answers), [mark.value for base in answers.bases for mark in base.special]
+    return on_waves(critical, answers), [mark.motion.value for base in answers.bases for mark in base.special]
 
 
 def assert_found(truth: list[float], answer: Search, listed: list[float], range_: tuple[float, float]) -> None:
@@ -272,9 +272,9 @@ def test_a_value_is_stable_where_one_sheet_of_the_branch_is_and_all_ends_are_lis
     found = Answers(Explorer(line, lambda *_: None, lambda: False).explore(), None)
     assert found.critical == pytest.approx(1.76694, abs=2e-4)
     [base] = found.bases
-    listed = {mark.kind: mark.value for mark in base.special[:4]}
-    assert base.special[1].value == pytest.approx(1.71369, abs=2e-4)
-    assert base.special[2].value == pytest.approx(1.74247, abs=2e-4)
+    listed = {mark.kind: mark.motion.value for mark in base.special[:4]}
+    assert base.special[1].motion.value == pytest.approx(1.71369, abs=2e-4)
+    assert base.special[2].motion.value == pytest.approx(1.74247, abs=2e-4)
     assert {"torus", "fold"} <= set(listed)
     largest = sorted(float(np.abs(each.multipliers).max()) for each in crossing(base, line.place(1.73)))
     assert largest[:2] == pytest.approx([0.99452, 1.00356], abs=1e-4)
