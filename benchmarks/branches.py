@@ -60,9 +60,8 @@ def main(number: int = SHOES, seed: int = SEED) -> None:
         through = last.reason.startswith(("it reaches", "it is closed")) or last.kind == "flutter"
         ends["gets through" if through else last.reason] += 1
         if not through:
-            print(
-                f"shoe {index}: {last.reason}, at {last.motion.value:.6g} ({len(cycles[0].points)} points, {spent:.2f} s)"
-            )
+            where = f"at {last.motion.value:.6g} ({len(cycles[0].points)} points, {spent:.2f} s)"
+            print(f"shoe {index}: {last.reason}, {where}")
     median = np.median(seconds)
     most = max(seconds)
     size = np.median(points)

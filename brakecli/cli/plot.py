@@ -14,7 +14,7 @@ from brakecli.front.measured import Measured
 SOURCE = "Result of any kind; with --quantity a measured signal, as for classify."
 SELECT = "Draw the nearest value of a sweep's axis; repeatable."
 VARIABLE = (
-    "Draw this number of a sweep or of branches; "
+    "Draw this number of a sweep; of branches the amplitude of x, y or vx, the mean, or another number; "
     "of a run x, y, vx, vy, friction_force, normal_force, torque or contact_fraction."
 )
 SECTION = (

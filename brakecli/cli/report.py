@@ -13,13 +13,15 @@ FULL = "Add the case, the evidence, accuracy, warnings, and how to repeat it."
 
 def command(
     results: Annotated[list[Path], source_argument("FILE.h5…", RESULTS)],
-    output: Annotated[Path | None, output_option("Page, .html or .pdf", "report.html, here")] = None,
+    output: Annotated[
+        Path | None, output_option("Page, .html, or .pdf with weasyprint", "report.html, here")
+    ] = None,
     full: Annotated[bool, option(FULL, None, "--full")] = False,
     force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:
-    """Put results on one page, answer first (needs jinja2; for a PDF weasyprint)."""
+    """Put results on one page, answer first (needs jinja2)."""
     from brakecli.reports.page import write_report
     from brakecli.runs.limits import within_range
 

@@ -28,6 +28,7 @@ _MARKERS = {
     "grazing stick": "v",
     "grazing flight": "d",
     "budget": "x",
+    "end": "",  # where the line ends, without a mark
 }
 _SLIDING = "steady sliding"
 _QUANTITIES = {  # the words at their axis

@@ -142,5 +142,5 @@ def _histogram(axes: Axes, shown: dict[str, style.Array], name: str, units: str,
     words = "friction coefficient" if len(shown) > 1 else name.replace("_", " ")
     style.set_ticks(axes.xaxis, float(every.min()), float(every.max()), units, words)
     axes.set_ylabel(whose)
-    style.make_room(axes)
-    axes.legend(loc="upper right", ncols=len(shown))
+    style.make_room(axes, 0.14 * len(shown))
+    axes.legend(loc="upper right")
