@@ -10,7 +10,6 @@ from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.signals.bursts import Burst
 from brakecli.analysis.signals.look import Measurand, SignalLook
 from brakecli.analysis.spectrum import segment
-from brakecli.files.fields import MEASURED_UNITS
 from brakecli.plots import style
 from brakecli.plots.run import COLUMNS, CYCLES, FEW, MOST_DETAIL, ROOM, envelope
 
@@ -48,7 +47,7 @@ def _title(source: str) -> str:
 def _draw_record(axes: Axes, look: SignalLook) -> None:
     values = look.signal.values
     step = look.signal.interval
-    factor, unit = style.prefixed(style.largest(values), MEASURED_UNITS[look.quantity])
+    factor, unit = style.prefixed(style.largest(values), look.verdict.unit)
     if len(values) > 2 * COLUMNS:
         places, low, high = envelope(lambda begin, end: values[begin:end], len(values))
         axes.fill_between(step * places, factor * low, factor * high, color=style.BLUE, lw=0.6)
@@ -129,7 +128,7 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     filled = np.interp(np.arange(len(values)), good, values[good])
     frequencies, density = welch(filled, 1.0 / step, nperseg=segment(len(filled)), detrend="constant")
     shown = (frequencies > 0.0) & (density > 0.0)
-    scale, label = style.density(density, frequencies, MEASURED_UNITS[look.quantity])
+    scale, label = style.density(density, frequencies, look.verdict.unit)
     density *= scale
     (axes.semilogy if burst else axes.loglog)(frequencies[shown], density[shown], color=style.BLUE, lw=1.0)
     axes.set(title=title, ylabel=label)

@@ -54,14 +54,13 @@ def of_run(numbers: Mapping[str, Any], title: str, output: str, show: Renderer) 
 
 def of_verdict(numbers: Mapping[str, Any], source: str, show: Renderer) -> View:
     """A verdict with its evidence, by the names and values that `--json` gives them."""
-    quantity = numbers.get("quantity", "")
-    si_unit = fields.MEASURED_UNITS.get(quantity, "")
-    noise_unit = "m/s" if quantity == "acceleration" else si_unit  # an acceleration is judged by its integral
+    unit = numbers.get("unit", "")
+    noise_unit = "m/s" if unit == "m/s²" else unit  # an acceleration is judged by its integral
     rows = [*_numbers(numbers, show), *_torque(numbers, show)]
     tones = numbers.get("bursts") or ()
     for tone in tones[:MOST_LISTED_BURSTS]:
         when = f"{tone['start']:.4g} to {tone['end']:.4g} s"
-        level = f"{tone['level']:.3g} {si_unit}"
+        level = f"{tone['level']:.3g} {unit}"
         rows.append(Row("burst", f"{when}: {show.text(tone['frequency'], 'Hz')}, {level}", detail=True))
     if len(tones) > MOST_LISTED_BURSTS:
         rows.append(Row("bursts", f"{len(tones) - MOST_LISTED_BURSTS} more, see --json", detail=True))

@@ -224,6 +224,15 @@ def test_a_sound_file_gives_its_rate_and_numbers_up_to_one(kind: str, largest: i
         read_signal(path, Measurand.PRESSURE, sample_rate=44100.0)
 
 
+@pytest.mark.parametrize(("unit", "told"), [(None, "of full scale"), ("Pa", "Pa")])
+def test_a_sound_without_a_unit_is_relative_to_full_scale(unit: str | None, told: str, tmp_path: Path) -> None:
+    path = str(tmp_path / "squeal.wav")
+    wavfile.write(path, 40000, (0.5 * SINE).astype(np.float32))
+    signal = read_signal(path, Measurand.PRESSURE, unit=unit)
+    assert signal.relative is (unit is None)
+    assert look(signal, Measurand.PRESSURE).verdict.unit == told
+
+
 def test_a_channel_is_chosen_and_a_damaged_sound_file_is_unreadable(tmp_path: Path) -> None:
     path = tmp_path / "two.wav"
     wavfile.write(path, 8000, np.stack([SINE, 2.0 * SINE], axis=1).astype(np.float32))

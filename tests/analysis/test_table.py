@@ -228,6 +228,27 @@ def test_what_still_grows_on_a_rough_wheel_looks_as_the_limit_cycle_to_which_it_
 
 
 @pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({}, True),
+        ({"lyapunov_exponent": 0.3, "lyapunov_error": 0.05}, False),  # chaos
+        ({"harmonic_share": 0.5, "band_share": 0.95}, True),
+        ({"harmonic_share": 0.5, "band_share": 0.5}, False),
+    ],
+)
+def test_a_regular_motion_of_a_phase_of_its_own_is_on_a_torus(changes: dict[str, Any], said: bool) -> None:
+    """A free phase is not locked to the waves, so that no whole numbers bind both frequencies."""
+    decided = decide(answers(**{**SHAKEN, **LASTS, "frequency": 171.6, **changes}), LIMITS)
+    assert decided.row.startswith("self-excited")
+    assert ("a torus: 171.6 Hz and the frequencies of the waves" in decided.sentence) is said
+
+
+def test_bands_that_are_no_multiples_of_one_frequency_are_those_of_a_torus_or_chaos() -> None:
+    decided = decide(answers(**LASTS, harmonic_share=0.5, band_share=0.95), LIMITS)
+    assert "95% of the energy of vx in three narrow bands, not multiples of one frequency" in decided.sentence
+
+
+@pytest.mark.parametrize(
     "changes",
     [
         {

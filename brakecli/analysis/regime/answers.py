@@ -203,8 +203,21 @@ class Answers(NamedTuple):
     def lines(self) -> str:
         """Where the energy of vx lies."""
         if not self.band_share <= self.harmonic_share and math.isfinite(self.band_share):
-            return f"{self.band_share:.0%} of the energy of vx in three narrow bands"
+            bands = f"{self.band_share:.0%} of the energy of vx in three narrow bands"
+            apart = self.harmonic_share < Thresholds.harmonic_share and not self.waves
+            return bands + ", not multiples of one frequency: a torus, or chaos" * apart
         return told("{harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
+
+    @property
+    def torus(self) -> float:
+        """Frequency (Hz) of a regular motion beside those of the waves; nan where neighbours part, as in chaos.
+
+        A motion with a phase of its own is not locked, so that no whole numbers bind both frequencies.
+        """
+        whole = self.harmonic_share >= Thresholds.harmonic_share
+        regular = whole or self.band_share >= Thresholds.band_share
+        chaos = self.lyapunov_exponent > Thresholds.sure_errors * self.lyapunov_error
+        return self.frequency if regular and not chaos else math.nan
 
     @property
     def limit(self) -> str:

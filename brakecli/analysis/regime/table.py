@@ -341,7 +341,8 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and (motion.growth_rate > 0.0 or (steady(motion, limits) and not another(motion, limits)))
             and gives(motion, limits)
         ),
-        "the vibration lasts without the roughness, with a phase of its own",
+        "the vibration lasts without the roughness, with a phase of its own"
+        "[ (a torus: {torus:.4g} Hz and the frequencies of the waves are incommensurate)]",
         regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
         excitation=Excitation.SELF_EXCITED,
     ),

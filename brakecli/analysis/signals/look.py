@@ -14,6 +14,7 @@ from brakecli.analysis.signals.measure import Heard, answers
 from brakecli.analysis.signals.slips import Slips, seek
 from brakecli.analysis.signals.table import SignalThresholds, decide
 from brakecli.analysis.spectrum import Array
+from brakecli.files.fields import MEASURED_UNITS
 
 _MOST_OF_IT = 0.9  # of the record: bursts that fill as much are the record
 _MOST_ENERGY = 0.5  # of all bursts in those that speak for the record
@@ -21,6 +22,7 @@ _ALIKE = 0.06  # of its frequency, by which a burst's may differ from that of th
 _INSIDE = 0.05  # of a burst, left out at either end
 _LEVEL = 0.3  # change of its logarithm in a burst; a ring-down that is cut at half has 0.7
 _DEFAULT = SignalThresholds()
+FULL_SCALE = "of full scale"
 _SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
 
 
@@ -51,6 +53,7 @@ class Signal:
     values: Array
     interval: float  # s
     notes: tuple[str, ...] = ()
+    relative: bool = False  # a sound file of which nobody has said what full scale means
 
 
 @dataclass(frozen=True)
@@ -66,6 +69,7 @@ class SignalVerdict:
     evidence: dict[str, Any]  # row that decided, and the answers that are known
     warnings: tuple[str, ...]
     thresholds: SignalThresholds
+    unit: str  # of the record, and of what is told of its bursts
     excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
     contact_loss_fraction: None = None  # nor whether contact was lost
 
@@ -175,5 +179,6 @@ def _judge(
         evidence={"row": decision.row, **numbers, "noise": noise},
         warnings=(*signal.notes, *notes),
         thresholds=thresholds,
+        unit=FULL_SCALE if signal.relative else MEASURED_UNITS[quantity],
     )
     return SignalLook(verdict, signal, quantity, velocity, slips, heard.smoothing)

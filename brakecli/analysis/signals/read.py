@@ -83,12 +83,14 @@ def read_signal(
             raise UsageError(f"{argument('time-unit')}: is for a column of times; {remedy}")
         times = []
         name = ""
+        relative = False
         wanted = _SI[quantity]
         if path.suffix.lower() in (".wav", ".wave") and inside is None:
             if time_column is not None:
                 raise UsageError(f"{argument('time-column')}: a sound file has no column of times; leave it out")
             values, sample_rate = _sound(path, column, sample_rate)
             size = _size(None, unit, *wanted)
+            relative = unit is None
         elif (sample_rate is None) == (time_column is None):
             given = "are not given" if time_column is None else "are given twice"
             remedy = f"give {argument('sample-rate')} HZ or {argument('time-column')} NAME"
@@ -112,7 +114,7 @@ def read_signal(
         _require(_NEAREST <= signal.interval <= _FARTHEST, near)
         of_contact = any(word in name for word in ("friction_force", "normal_force"))
         jumps = [_JUMPS.format(argument("quantity"))] * (of_contact and quantity is Measurand.FORCE)
-        return replace(signal, notes=(*signal.notes, *jumps))
+        return replace(signal, notes=(*signal.notes, *jumps), relative=relative)
     except (UsageError, UnreadableResultError) as error:
         raise type(error)(f"{source}: {error}") from error
     except OSError as error:
