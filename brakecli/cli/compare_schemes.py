@@ -60,7 +60,7 @@ def command(
     show_result(
         "compare-schemes",
         numbers,
-        lambda show: of_comparison(report),
+        lambda show: of_comparison(numbers, report.in_a_case, report.title),
         as_json=as_json,
         quiet=quiet,
         details=details,

@@ -123,13 +123,6 @@ class Comparison:
     left_out: int  # rungs that the budget did not allow
     entries: tuple[Entry, ...]
 
-    def finer_error(self, entry: Entry) -> float:
-        """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
-        kind = entry.kind
-        step = entry.method.step or 0.0
-        finer = (each for each in self.entries if each.kind == kind and (each.method.step or step) < step)
-        return max((each.error for each in finer if each.errors), default=0.0)
-
 
 def compare(
     system: System,

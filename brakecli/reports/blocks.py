@@ -5,6 +5,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from brakecli.files.field import Field
 from brakecli.plots import style
 from brakecli.sweeps.result import unit
 from brakecli.views.render import Renderer
+from brakecli.views.view import Row, View, sentences
+from brakecli.views.view import Table as Columns
 
 Numbers = Mapping[str, tuple[Any, str]]
 """What results are compared by: values with their units, by their names."""
@@ -123,6 +126,20 @@ def _prefixed(value: Any, unit: str) -> str:
 PAGE = Renderer(_prefixed, "–", most=8, each=True)
 """A page writes a prefix where a number needs one."""
 shown = PAGE.text
+
+
+def blocks_of(view: View) -> list[Any]:
+    """The numbers and tables of a view, as a page writes them."""
+    found = list[Any]()
+    for kind, blocks in groupby(view.blocks, type):
+        if kind is Row:
+            found.append(Table([(each.label, each.text) for each in blocks if isinstance(each, Row)]))
+            continue
+        for each in blocks:
+            if isinstance(each, Columns):
+                found.append(Texts(sentences([each.title])))
+                found.append(Table([*zip(*each.columns.values(), strict=True)], [*each.columns]))
+    return found
 
 
 def percent(part: float) -> str:

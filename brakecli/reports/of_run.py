@@ -18,20 +18,34 @@ from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.tables import key_schema
 from brakecli.errors import escaped
 from brakecli.files import fields
-from brakecli.files.field import flat, named
+from brakecli.files.field import flat, named, values_of
 from brakecli.files.read import StoredResult
-from brakecli.files.stability_fields import ADVICE
+from brakecli.files.stability_fields import ADVICE, STABILITY, THRESHOLDS
 from brakecli.files.write import FILL
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
-from brakecli.reports.blocks import PAGE, Code, Part, Section, Table, Texts, numbers_of, percent, picture, shown
+from brakecli.reports.blocks import (
+    PAGE,
+    Code,
+    Part,
+    Section,
+    Table,
+    Texts,
+    blocks_of,
+    numbers_of,
+    percent,
+    picture,
+    shown,
+)
 from brakecli.runs.advise import AdviceReport, advise
 from brakecli.scattering.advised import under_tolerance
 from brakecli.solver.integrate import Counted
 from brakecli.sweeps.result import unit
 from brakecli.views.motion import motion_sentence, reasons_of
-from brakecli.views.view import sentences
+from brakecli.views.stability import of_advice, of_stability
+from brakecli.views.view import Table as Columns
+from brakecli.views.view import View, sentences
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
@@ -40,8 +54,7 @@ MARGIN = 0.2  # of the friction, that advice aims at
 BEYOND = 1.5
 MOST_BEYOND = 4.0
 VALUES = 121  # of the friction in the lock-in diagram
-# keys that are shown; the latter on the first page
-MOST_SENSITIVE = 6
+# keys on the first page
 MOST_CHANGES = 5
 MOST_WORK = 60.0  # of asking all, as `runs.work` counts it
 _UNITS = [each.units for each in fields.VIBRATION]
@@ -147,33 +160,17 @@ def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
 
 def _stability(advice: AdviceReport) -> Iterator[Any]:
     report = advice.stability
-    rows = [("steady sliding", "none", report.no_equilibrium or "")] if report.equilibrium is None else []
-    for each in report.crossings:
-        change = "lost" if each.lost else "regained"
-        how = f"by {each.instability}, {shown(each.frequency, 'Hz')}"
-        rows.append((f"stability {change}", f"at φ = {each.friction:.6g}", how))
-    if (least := advice.thresholds.coexists_from) is not None:
-        rows.append(("a vibration can exist", f"from φ = {least:.6g} on", "beside stable sliding"))
-    if (barrier := advice.thresholds.barrier) is not None:
-        what = "half of peak to peak of x of the unstable cycle"
-        rows.append((f"barrier at φ = {report.friction:g}", shown(float(f"{barrier:.4g}"), "m"), what))
-    for mode in report.modes:
-        growth = f"{'grows' if mode.growth > 0.0 else 'decays'} at {abs(mode.growth):.4g} 1/s"
-        ratio = style.readable(float(f"{mode.damping_ratio:.3g}"))
-        name = f"mode at φ = {report.friction:g}"
-        rows.append((name, shown(mode.frequency, "Hz"), f"{growth}, damping ratio {ratio}"))
-    yield Table(rows)
+    known = values_of(STABILITY, report) | values_of(THRESHOLDS, advice.thresholds)
+    view = of_stability(known, "", PAGE)
+    yield Texts(view.answer)
+    yield from blocks_of(view)
     if report.equilibrium is not None and report.belt_speed:
         yield picture(
             "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient",
             partial(_diagram, advice),
         )
-    if advice.advice:
-        yield _changes(advice.advice, advice.wanted_margin)
-    known = [each for each in advice.sensitivities if each.elasticity][:MOST_SENSITIVE]
-    if known:
-        moves = [(each.parameter, percent(0.01 * (each.elasticity or 0.0))) for each in known]
-        yield Table(moves, ("what moves it most", "critical friction for 1 % more"))
+    tables = [each for each in of_advice(advice, PAGE).blocks if isinstance(each, Columns)]
+    yield from blocks_of(View("", blocks=tables))
 
 
 def _diagram(advice: AdviceReport) -> Figure:

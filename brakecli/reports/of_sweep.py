@@ -1,7 +1,7 @@
 """The parts of a page about sweeps, comparisons of schemes, stability along a key, branches, and scatter."""
 
 import shlex
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -12,20 +12,9 @@ from brakecli.analysis.regime.decision import Regime
 from brakecli.case.read import parse_table
 from brakecli.errors import CaseError, UsageError, escaped
 from brakecli.files import fields
-from brakecli.files.field import Field, named
+from brakecli.files.numbers import stored_numbers
 from brakecli.files.read import StoredResult
-from brakecli.files.stability_fields import (
-    BRANCH,
-    INDEX,
-    LOCK_IN,
-    OUTCOME,
-    PROBABILITY,
-    PROBABLE,
-    SCATTER,
-    SCATTERING,
-    SPECIAL,
-)
-from brakecli.files.write import FILL
+from brakecli.files.stability_fields import BRANCH, LOCK_IN, PROBABLE, SCATTER
 from brakecli.plots import style
 from brakecli.plots.gather import gather, numeric
 from brakecli.plots.result import draw
@@ -40,19 +29,20 @@ from brakecli.reports.blocks import (
     Section,
     Table,
     Texts,
+    blocks_of,
     key_unit,
     numbers_of,
     picture,
-    rounded,
     shown,
 )
 from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
 from brakecli.sweeps.record import Status
+from brakecli.views.points import of_comparison, regimes_sentence
+from brakecli.views.stability import of_branch, of_lock_in, of_scatter
+from brakecli.views.view import sentence
 
 MOST_FAILURES = 20
-_NONE_AT_0 = ("error", "amplitude", "frequency")  # of a special point: 0 says that there is none
-_SPECIAL = ("kind", "value", "error", "amplitude", "frequency", "reason")
 _TEXTS = ("regime", "excitation", "critical_status", "sustained_status", "reason")
 _ERRORS = ("estimated_error", "critical_error", "critical_bias", "unconverged_steps")
 _IDLE = ("settled", "settled_from", "steps", "contact_evaluations", "unconverged_steps", "warning_count")
@@ -139,9 +129,9 @@ def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
     if found.critical is None:
         lasting = np.isin(found["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
         kinds, counts = np.unique(found["regime"][done], return_counts=True)
-        each = ", ".join(f"{kind} at {count}" for kind, count in zip(kinds, counts, strict=True))
-        said = [f"It vibrates at {lasting.sum()} of {size} points: {each}."]
-        numbers |= {f"{kind} at": (int(count), "1") for kind, count in zip(kinds, counts, strict=True)}
+        regimes = dict(zip(kinds.tolist(), counts.tolist(), strict=True))
+        said = [sentence(regimes_sentence(regimes, size))]
+        numbers |= {f"{kind} at": (count, "1") for kind, count in regimes.items()}
         values = np.where(lasting, values, np.nan)
     else:
         there = int(np.isfinite(values).sum())
@@ -165,43 +155,33 @@ def part_of_other(result: StoredResult) -> Part:
     kind = str(result.attributes["kind"])
     declared = {"stability": LOCK_IN, "branch": BRANCH, "scatter": SCATTER}
     apart = ("title", "recommended", "sentence")
+    key = _unit_of_key(result)
     known = [
-        replace(each, units=_unit_of_key(result)) if each.units == "of the key" else each
+        replace(each, units=key) if each.units == "of the key" else each
         for each in declared.get(kind, fields.COMPARISON)
         if each.name not in apart and each.in_file
     ]
-    numbers = numbers_of(known, result.attributes)
+    held = stored_numbers(result)
+    compared = numbers_of(known, result.attributes)
     drawn = picture(_PICTURES[kind], partial(draw, result))
-    answer = ["No entry meets the wanted error."]
-    if kind == "stability":
-        where = ", ".join(f"{value:.6g}" for value in np.ravel(result.attributes.get("critical_values", ())))
-        key = ", ".join(map(str, result.attributes.get("parameters", ())))
-        answer = [f"Along {key}, stability {f'changes at {where}' if where else 'does not change'}."]
-    if kind in ("branch", "scatter"):
-        sentence = str(result.attributes.get("sentence", ""))
-        answer = [f"{sentence[:1].upper()}{sentence[1:]}."]
-    tables = [Table(PAGE.rows(known, result.attributes))]
+    views = {
+        "stability": lambda: of_lock_in(held, PAGE, key),
+        "branch": lambda: of_branch(held, "", key, PAGE),
+        "scatter": lambda: of_scatter(held, ""),
+        "comparison": lambda: of_comparison(held, {}, ""),
+    }
+    view = views[kind]()
+    answer = [*view.answer]
     study = list[Section]()
-    if kind == "branch":
-        tables.append(_special(result))
     if kind == "scatter":
         said, tables_of_study = _study(result)
         answer.append(said)
         study = [Section("Study", tables_of_study)]
-        names = OUTCOME, *PROBABILITY
-        rows = [(PROBABLE.get(name, name), *more) for name, *more in _rows(result, "/", names)]
-        tables.append(Table(rows, ("a sample is", "probability", "from", "to, with 95 %")))
-        shares = zip(rows, style.read_column(result, "probability").tolist(), strict=True)
-        numbers = {**{f"probability: {name}": (share, "1") for (name, *_), share in shares}, **numbers}
-        if "total" in result.variables("/"):
-            head = ("parameter", "alone it makes", "with all others", "±, of the variance")
-            tables.append(Table(_rows(result, "/", (SCATTERING, *INDEX)), head))
-    best = result.attributes.get("recommended")
-    if kind == "comparison" and isinstance(best, int):
-        method, step, error = (style.read_column(result, name)[best] for name in ("method", "step", "error"))
-        steps = f"steps of {shown(float(step), 's')}" if np.isfinite(step) else "its own steps"
-        answer = [f"Recommended: {method} with {steps}, whose error is {error:.2g}."]
-    return _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", tables)], numbers)
+        shares = {
+            f"probability: {PROBABLE.get(name, name)}": (each, "1") for name, each in held["probability"].items()
+        }
+        compared = {**shares, **compared}
+    return _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", blocks_of(view))], compared)
 
 
 def _study(result: StoredResult) -> tuple[str, list[Table]]:
@@ -257,30 +237,6 @@ def _range(result: StoredResult, kind: str) -> str:
         key = ",".join(map(str, result.attributes.get("parameters", ())))
         ends = [float(values[0]), float(values[-1]), len(values)]
     return escaped(shlex.quote(f"{key}={':'.join(map(repr, ends))}"))
-
-
-def _special(result: StoredResult) -> Table:
-    """The special points of all branches."""
-    rows = list[tuple[str, ...]]()
-    groups = [each for each in result.groups if each.endswith("/special")]
-    for group in sorted(groups, key=lambda each: (len(each), each)):  # branch_10 comes after branch_9
-        branch = group.removesuffix("/special")
-        which = f"{branch.replace('_', ' ')}, {result.group_attributes(branch).get('kind', '')}"
-        rows += [(which, *row) for row in _rows(result, group, named(SPECIAL, *_SPECIAL))]
-    return Table(rows, ("branch", "special point", "at", "error", "amplitude of x", "frequency", "why"))
-
-
-def _rows(result: StoredResult, group: str, known: Iterable[Field]) -> list[tuple[str, ...]]:
-    """The variables of a group, a row for each place along them."""
-    columns = []
-    for each in known:
-        values = result.read(group, each.name).tolist()
-        missing = (FILL, 0.0) if each.name in _NONE_AT_0 else (FILL,)
-        units = style.unit_of(result.variables(group)[each.name].attributes)
-        columns.append(["–" if value in missing else shown(rounded(value, 5), units) for value in values])
-    if len({*map(len, columns)}) != 1:
-        raise style.unreadable(result, f"the variables of its group {group} do not fit each other")
-    return [*zip(*columns, strict=True)]
 
 
 def _plain(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import groupby
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,6 @@ from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import Row, Table, View, details, sentences
 
 if TYPE_CHECKING:
-    from brakecli.comparison.result import ComparisonReport
     from brakecli.sweeps.attractors import Attractor
     from brakecli.sweeps.result import SweepReport
 
@@ -183,44 +182,70 @@ def _attractors(found: Iterable[Attractor]) -> Table:
     return Table(columns)
 
 
-def of_comparison(report: ComparisonReport) -> View:
-    """What is recommended, the entries that no other beats, and on demand the finest of each other method."""
-    found = report.comparison
-    best = report.recommended
-    entries = list(zip(found.entries, report.numbers()["entries"], strict=True))
-    for _, numbers in entries:
-        numbers["milliseconds"] = 1e3 * (numbers["wall_seconds"] or 0.0)
-        numbers["step"] = numbers["step"] or (f"to {numbers['tolerance']:g}" if numbers["tolerance"] else "exact")
-    able = [(entry, numbers) for entry, numbers in entries if entry.errors is not None]
-    front = sorted((numbers for entry, numbers in able if entry.on_front), key=lambda each: each["milliseconds"])
-    finest = {entry.kind: numbers for entry, numbers in able if not entry.on_front}
-    failed = [entry for entry in found.entries if entry.work is not None and entry.errors is None]
-    answer = [f"no method meets the wanted error of {report.target:g}"]
+def of_comparison(numbers: Mapping[str, Any], keys: Mapping[str, Any], title: str) -> View:
+    """What is recommended, the entries that no other beats, and on demand the finest of each other method.
+
+    `numbers` are those of `--json`; `keys` of a case ask for the recommended method.
+    """
+    best = numbers["recommended"]
+    target = numbers["target_error"]
+    able = [each for each in numbers["entries"] if each["error"] is not None]
+    front = sorted((each for each in able if each["on_front"]), key=lambda each: each["wall_seconds"] or 0.0)
+    finest = {_method(each): each for each in able if not each["on_front"]}
+    failed = [each for each in numbers["entries"] if each["steps"] and each["error"] is None]
+    answer = [f"no method meets the wanted error of {target:g}"]
     if best is not None:
-        answer = [f"recommended is {best}: its error is {best.error:.2g}, and {report.target:g} is the target"]
-        if (finer := found.finer_error(best)) > report.target:
+        said = f"recommended is {_entry(best)}"
+        answer = [f"{said}: its error is {best['error']:.2g}, and {target:g} is the target"]
+        if (finer := finer_error(able, best)) > target:
             chance = f"this is by chance: at a finer step its error is {finer:.2g}"
             answer.append(f"{chance}; choose a method with more margin")
     blocks: list[Row | Table] = []
-    if report.in_a_case:
-        keys = ", ".join(f"{key} = {json.dumps(each)}" for key, each in report.in_a_case.items())
-        blocks.append(Row("in a case", keys))
-    blocks += [Row("failed", f"{len(failed)} entries, such as {each}: {each.failure}") for each in failed[:1]]
-    if found.left_out:
-        left_out = f"{found.left_out} entries, because the time was used up; give a larger --budget"
-        blocks.append(Row("left out", left_out))
-    blocks.append(Row("file", str(report.output)))
-    times = f"median of {found.repeats} repetitions," if found.repeats > 1 else "measured once,"
-    reference = f"event-driven, error below {found.reference_error:.1e}, {found.reference_seconds:.3g} s"
+    if keys:
+        blocks.append(Row("in a case", ", ".join(f"{key} = {json.dumps(each)}" for key, each in keys.items())))
+    such = [f"{len(failed)} entries, such as {_entry(each)}: {each['failure']}" for each in failed[:1]]
+    blocks += [Row("failed", each) for each in such]
+    if left := numbers["left_out"]:
+        blocks.append(Row("left out", f"{left} entries, because the time was used up; give a larger --budget"))
+    if numbers.get("output"):
+        blocks.append(Row("file", numbers["output"]))
+    repeats = numbers["repeats"]
+    times = f"median of {repeats} repetitions," if repeats > 1 else "measured once,"
+    reference = f"error below {numbers['reference_error']:.1e}"
+    if (seconds := numbers["reference_seconds"]) is not None:
+        reference += f", {seconds:.3g} s"
     blocks += details(
-        Row("compared over", f"{found.duration:.6g} s of motion"),
-        Row("reference", reference),
+        Row("compared over", f"{numbers['duration']:.6g} s of motion"),
+        Row("reference", f"event-driven, {reference}"),
         Row("times", f"{times} of the time loop alone"),
     )
     blocks.append(Table(_entries(front), "No other has a smaller error in less time"))
     blocks.append(Table(_entries(finest.values()), "The finest of the others", first=0))
-    return View(report.title, sentences(answer), blocks)
+    return View(title, sentences(answer), blocks)
 
 
-def _entries(records: Collection[Mapping[str, Any]]) -> dict[str, Sequence[str]]:
-    return {header: [text_of(each[name], form=form) for each in records] for name, header, form in ENTRIES}
+def finer_error(entries: Iterable[Mapping[str, Any]], entry: Mapping[str, Any]) -> float:
+    """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
+    step = entry["step"] or 0.0
+    finer = [each for each in entries if _method(each) == _method(entry) and (each["step"] or step) < step]
+    return max((each["error"] for each in finer if each["error"] is not None), default=0.0)
+
+
+def _method(entry: Mapping[str, Any]) -> tuple[Any, ...]:
+    """What distinguishes a method from others, whatever its step."""
+    return tuple(str(entry[name]) for name in ("scheme", "theta", "start", "iteration", "evaluator", "nodes"))
+
+
+def _entry(entry: Mapping[str, Any]) -> str:
+    """The method with its step or tolerance."""
+    if entry["step"] is not None:
+        return f"{entry['method']}, step {entry['step']:.3g} s"
+    return f"{entry['method']}, tolerance {entry['tolerance']:g}" if entry["tolerance"] else str(entry["method"])
+
+
+def _entries(records: Iterable[Mapping[str, Any]]) -> dict[str, Sequence[str]]:
+    told = []
+    for each in records:
+        rung = f"to {each['tolerance']:g}" if each["tolerance"] else "exact"
+        told.append({**each, "step": each["step"] or rung, "milliseconds": 1e3 * (each["wall_seconds"] or 0.0)})
+    return {header: [text_of(each[name], form=form) for each in told] for name, header, form in ENTRIES}

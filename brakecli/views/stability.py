@@ -69,12 +69,18 @@ def of_stability(numbers: Mapping[str, Any], title: str, show: Renderer, units: 
     if numbers.get("output"):
         found.append(Row("file", numbers["output"]))
     if numbers.get("vary"):
-        table = _along(numbers["vary"], numbers["parameters"])
-        where = ", ".join(show.text(value, units.removeprefix("1")) for value in numbers["critical_values"])
-        changes = f"changes at {where}" if where else "does not change"
-        answer.append(f"along {', '.join(numbers['parameters'])}, stability {changes}")
-        found.append(table)
+        along = of_lock_in(numbers, show, units)
+        answer += along.answer
+        found += along.blocks
     return View(title, sentences(answer), found)
+
+
+def of_lock_in(numbers: Mapping[str, Any], show: Renderer, units: str) -> View:
+    """Where stability changes along a key, and both modes there; `numbers` are those of `--json`."""
+    where = ", ".join(show.text(value, units.removeprefix("1")) for value in numbers["critical_values"] or ())
+    changes = f"changes at {where}" if where else "does not change"
+    answer = f"along {', '.join(numbers['parameters'])}, stability {changes}"
+    return View("", [sentence(answer)], [_along(numbers["vary"], numbers["parameters"])])
 
 
 def _without_loss(numbers: Mapping[str, Any]) -> str:
@@ -260,7 +266,7 @@ def of_scatter(numbers: Mapping[str, Any], title: str) -> View:
 
     failed = f", {numbers['failed']} without an answer" if numbers["failed"] else ""
     blocks: list[Row | Table] = [Row("samples", f"{numbers['samples']}{failed}")]
-    blocks += [Row("note", each) for each in numbers["notes"]]
+    blocks += [Row("note", each) for each in numbers["notes"] or ()]
     if numbers.get("output"):
         blocks.append(Row("file", str(numbers["output"])))
     if numbers["quantiles"]:

@@ -33,9 +33,11 @@ from brakecli.comparison.methods import (
 )
 from brakecli.comparison.result import ComparisonReport
 from brakecli.errors import UsageError
+from brakecli.files.field import values_of
+from brakecli.files.fields import ENTRY
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schemes import NUMEROV, QUARTERS, SCHEMES, load
-from brakecli.views.points import of_comparison
+from brakecli.views.points import finer_error, of_comparison
 from tests.campaign import campaign
 from tests.commands import ROOT, TINY, attributes, brakecli, left_in
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
@@ -321,13 +323,15 @@ def test_an_error_that_is_low_by_chance_is_told() -> None:
     coarsest, *finer = [e for e in entries_of(found, "two-layer", (0.5, 0.5)) if e.errors is not None]
     assert coarsest.errors is not None
     worst = max(entry.errors.error for entry in finer if entry.errors is not None)
-    assert found.finer_error(coarsest) == worst
-    assert found.finer_error(finer[-1]) == 0.0
+    known = ComparisonReport(Path("x.h5"), smooth(), found, 1.0).numbers()["entries"]
+    assert finer_error(known, values_of(ENTRY, coarsest)) == worst
+    assert finer_error(known, values_of(ENTRY, finer[-1])) == 0.0
     target = 1e-3 * min(entry.errors.error for entry in finer if entry.errors is not None)
     lucky = replace(coarsest, errors=replace(coarsest.errors, error=target / 2.0))
     for entries, told in (((lucky, *finer), True), ((lucky,), False)):
         chosen = replace(found, entries=entries, reference_error=0.0)
-        answer = of_comparison(ComparisonReport(Path("x.h5"), smooth(), chosen, target)).answer
+        numbers = ComparisonReport(Path("x.h5"), smooth(), chosen, target).numbers()
+        answer = of_comparison(numbers, {}, "").answer
         assert ("by chance" in answer[-1]) == told
 
 

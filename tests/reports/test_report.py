@@ -24,6 +24,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
 from brakecli.files.field import Field
+from brakecli.files.numbers import rows as records
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import style
@@ -168,7 +169,7 @@ def test_a_report_of_a_run_answers_first_and_holds_all_that_is_promised(results:
     for version in ("brakecli", "numpy", "scipy", "numba", "h5py", "hdf5"):
         assert f"{version} {attributes[f'{version}_version']}" in text
     assert "brakecli run run.h5 -o again.h5" in text
-    assert "critical friction for 1 % more" in text
+    assert "Critical friction for 1 % and for 1 unit of a value" in text
 
 
 def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
@@ -419,10 +420,11 @@ def test_branches_have_a_sentence_a_picture_and_their_special_points(
         lines = draw(stored).axes[0].get_lines()
     looks = {str(line.get_label()): line.get_linestyle() for line in lines}
     assert (looks["steady sliding"], looks["limit cycle"], looks["unstable"]) == ("-", "-", "--")
-    flutter = [cells for _, cells in rows(page.html) if cells[1:2] == ["flutter"]]
-    assert [cells[0] for cells in flutter] == ["branch 0, steady sliding", "branch 1, limit cycle"]
-    assert {cells[2] for cells in flutter} == {f"{critical.friction:.5g}"}
-    assert flutter[0][4] == "–"  # no motion has an amplitude there
+    flutter = [cells for _, cells in rows(page.html) if cells[:1] == ["flutter"]]
+    assert [float(cells[1]) for cells in flutter] == [pytest.approx(critical.friction, rel=1e-6)] * 2
+    assert flutter[0][3] == "-"  # no motion has an amplitude there
+    text = " ".join(page.texts)
+    assert text.index("Branch 0: steady sliding") < text.index("Branch 1: limit cycle")
 
 
 def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) -> None:
@@ -432,7 +434,7 @@ def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) 
             result.variable("/", each, (each.name,), np.ones(size))
         result.commit()
     with open_result(tmp_path / "r.h5") as stored, pytest.raises(UnreadableResultError, match="do not fit"):
-        of_sweep._rows(stored, "/", known)
+        records(stored, "/", known)
 
 
 def test_scatter_has_its_study_and_its_probabilities_as_tables(
@@ -460,7 +462,8 @@ def test_scatter_has_its_study_and_its_probabilities_as_tables(
     squeal = [cells for _, cells in rows(page.html) if cells[0] == "squeal"]
     of = {"outcome": "squeal"}
     names = "probability", "probability_lower", "probability_upper"
-    assert squeal == [["squeal", *(f"{float(found[name].sel(of)):.5g}" for name in names)]]
+    share, low, high = (f"{float(found[name].sel(of)):.2%}" for name in names)
+    assert squeal == [["squeal", share, f"{low} to {high}"]]
     assert "brakecli advise CASE.toml --scatter STUDY.toml" in page.html
 
 
