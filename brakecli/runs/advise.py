@@ -32,8 +32,6 @@ _DECAYED = 15.0
 _DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
-OF_A_STUDY = "as of the study"
-"""The scatter of a study in words."""
 _ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
 
 
@@ -64,6 +62,7 @@ class AdviceReport:
     left_out: str = ""  # what was not asked, as it takes too long
     squeal: Left | None = None  # of the case itself, under scatter
     scatter: str = ""  # which one, in words
+    ranking: str = "Confirmed by a run, smallest relative change first"
 
     @property
     def margin(self) -> float | None:

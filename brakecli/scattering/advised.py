@@ -19,7 +19,7 @@ from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.runs.advise import OF_A_STUDY, AdviceReport
+from brakecli.runs.advise import AdviceReport
 from brakecli.scattering.draw import drawn
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.scatter import squeals
@@ -127,7 +127,8 @@ def under_scatter(
 
     advice = [replace(each, squeal=left(each) if each.to is not None else None) for each in report.advice]
     advice.sort(key=lambda each: np.inf if each.squeal is None else each.squeal.squeal_probability)
-    return replace(report, advice=advice, squeal=left(None), scatter=OF_A_STUDY)
+    ranking = "What leaves least squeal under the study's scatter first"
+    return replace(report, advice=advice, squeal=left(None), scatter="as of the study", ranking=ranking)
 
 
 def _changed(columns: dict[str, list[float]], change: Change | None, base: LoadedCase) -> LoadedSweep:

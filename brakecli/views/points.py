@@ -15,7 +15,7 @@ from brakecli.faces import argument
 from brakecli.files import fields
 from brakecli.files.field import Field, named, values_of
 from brakecli.views.render import Renderer, text_of
-from brakecli.views.view import Row, Table, View, details, sentences
+from brakecli.views.view import SHORT_POINTS, Row, Table, View, details, sentences
 
 if TYPE_CHECKING:
     from brakecli.sweeps.attractors import Attractor
@@ -25,8 +25,6 @@ POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, "critical", "critical_error"))
 SEARCHES = named(fields.CRITICAL, "critical_eigenvalue", "critical_sustained", "critical_status")
 """What a search says beside its value, shown where it says something else."""
-SHORT_POINTS = 6
-"""Points that are listed unless all are asked for: a short answer has twelve lines."""
 MOST_LISTED_POINTS = 200
 MOST_STRETCHES = 6
 """Stretches of equal regimes along an axis that a row lists."""

@@ -8,9 +8,8 @@ from typing import TYPE_CHECKING, Any
 from brakecli.analysis.stability.advice import rounded
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import labelled
-from brakecli.runs.advise import OF_A_STUDY
 from brakecli.views.render import Renderer, text_of
-from brakecli.views.view import Row, Table, View, details, sentence, sentences
+from brakecli.views.view import SHORT_POINTS, Row, Table, View, details, sentence, sentences
 
 if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change
@@ -18,10 +17,6 @@ if TYPE_CHECKING:
 
 SHORT_ADVICE = 3
 """Keys to change that are shown unless all are asked for."""
-SHORT_POINTS = 6
-"""Values along a key that are listed unless all are asked for."""
-_RANKED = "Confirmed by a run, smallest relative change first"
-_RANKED_BY_STUDY = "What leaves least squeal under the study's scatter first"
 _MOVES = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %"
 _STATE = {True: "stable", False: "unstable", None: "-"}
 _MODES = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
@@ -181,8 +176,8 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
         blocks += details(Row("checked by a run", f"{ran}: {check.verdict.regime}"))
         blocks += details(Row("why", "; ".join(check.verdict.reasons)))
     if report.advice:
-        ranked = _RANKED_BY_STUDY if report.scatter == OF_A_STUDY else _RANKED
-        blocks.append(Table(_advice(report.advice, report.squeal is not None), ranked, first=SHORT_ADVICE))
+        advice = _advice(report.advice, report.squeal is not None)
+        blocks.append(Table(advice, report.ranking, first=SHORT_ADVICE))
     if moves := _moves(report):
         blocks.append(Table(moves, _MOVES, first=0))
     return View(report.title, [sentence(report.conclusion())], blocks)

@@ -5,6 +5,9 @@ from dataclasses import dataclass, field, replace
 
 from brakecli.faces import argument
 
+SHORT_POINTS = 6
+"""Points, or values along a key, that are listed unless all are asked for: a short answer has twelve lines."""
+
 
 @dataclass(frozen=True)
 class Row:
