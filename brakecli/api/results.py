@@ -74,7 +74,7 @@ def classify(
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
     from brakecli.files.as_xarray import dataset
-    from brakecli.files.fields import EXPONENT, VERDICT
+    from brakecli.files.fields import EXPONENT, UNIT, VERDICT
     from brakecli.front.verdict import verdict_on
 
     if "second_run" in reading:
@@ -84,7 +84,7 @@ def classify(
     with interruptible(), readings_told(force_read=force_read), as_files([source], "result") as (file,):
         numbers = verdict_on(str(file), measured, changes)
     warn(numbers.get("warnings", ()))
-    return dataset((*VERDICT, *EXPONENT), numbers)
+    return dataset((*VERDICT, *EXPONENT, UNIT), numbers)
 
 
 def plot(

@@ -71,6 +71,7 @@ VERDICT = within(
     ),
     Field("thresholds", "", "numbers that decide a verdict", OBJECT, group="regime/thresholds"),
 )
+UNIT = Field("unit", "", "unit of a measured record and of its bursts", TEXT)
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}
 _EVIDENCE_UNITS = {

@@ -2,6 +2,7 @@
 
 import shutil
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,6 +12,8 @@ from typing import TextIO, cast
 from brakecli.files.os_signals import Styled, lastly
 
 FIRST_LINE = 20.0
+FIRST_WORD = 1.0
+"""Seconds without a word, after which a terminal shows that there is work."""
 LAST_LINES = 600.0
 """Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
 
@@ -55,9 +58,15 @@ def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[s
     bar = rich_progress.Progress(*columns, console=console, transient=True)
     with lastly(bar.stop):
         bar.start()
-        task = bar.add_task("", visible=False)
+        task = bar.add_task("at work", visible=False, total=None)
+        unsaid = threading.Timer(FIRST_WORD, bar.update, (task,), {"visible": True})
+        unsaid.daemon = True
+        unsaid.start()
 
         def show(what: str, done: int, total: int) -> None:
-            bar.update(task, description=what, completed=done, total=total, visible=True)
+            bar.update(task, description=what, completed=done, total=total or None, visible=True)
 
-        yield show
+        try:
+            yield show
+        finally:
+            unsaid.cancel()

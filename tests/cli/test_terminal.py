@@ -90,12 +90,12 @@ def evidence(numbers: dict[str, Any]) -> dict[str, str]:
 
 
 def test_the_noise_of_an_acceleration_is_that_of_the_velocity_by_which_it_is_judged() -> None:
-    for quantity, unit in (("displacement", "m"), ("velocity", "m/s"), ("acceleration", "m/s"), ("force", "N")):
+    for measured, unit in (("m", "m"), ("m/s", "m/s"), ("m/s²", "m/s"), ("N", "N"), ("of full scale",) * 2):
         numbers: dict[str, Any] = dict.fromkeys(
             ("frequency", "amplitude", "stick_fraction", "contact_loss_fraction")
         )
         numbers |= {"regime": "damped", "excitation": "none", "reasons": ["so it is"], "evidence": {"noise": 2.5}}
-        assert evidence(numbers | {"quantity": quantity})["noise"] == f"2.5 {unit}"
+        assert evidence(numbers | {"unit": measured})["noise"] == f"2.5 {unit}"
 
 
 def test_a_terminal_gets_messages_without_a_broken_word_and_a_file_gets_them_in_one_line(
@@ -126,6 +126,21 @@ def test_long_work_without_a_terminal_says_a_line_now_and_then(
     with progress.telling(True) as tell:
         tell("steps", 1, 2)
     assert capsys.readouterr().err == ""
+
+
+def test_a_terminal_is_told_of_work_that_says_nothing_itself() -> None:
+    """The process waits until its standard input ends, which is when the words were seen."""
+    work = "import sys; from brakecli.front.progress import telling\nwith telling(False): sys.stdin.read()"
+    terminal, stderr = pty.openpty()
+    line = [sys.executable, "-c", work]
+    with subprocess.Popen(line, stdin=subprocess.PIPE, stderr=stderr, env=environment(TERM="xterm")) as process:
+        os.close(stderr)
+        shown = b""
+        while b"at work" not in shown:
+            shown += os.read(terminal, 1 << 16)
+        process.communicate()
+    os.close(terminal)
+    assert process.returncode == 0
 
 
 @campaign
