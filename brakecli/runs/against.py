@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 from brakecli.runs.certificate import MISSED, NOTHING, Certificate, Certified, compare, displacement
 from brakecli.runs.first import FIRST, ORDER_OF_NODES, first_nodes, first_step
-from brakecli.runs.own_error import MOST_SECONDS, SAFETY, Known, first_of
-from brakecli.runs.work import FINEST, evaluation_work
+from brakecli.runs.own_error import MOST_WORK, SAFETY, Known, first_of
+from brakecli.runs.work import FINEST, evaluation_work, work_done
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion, Work, solve
 from brakecli.solver.method import Method
@@ -92,11 +92,13 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
     steps = sum(work.all_steps for work in spent)
     step = first_step(system)
     before = None
+    counted = 0.0
     for left in range(MOST_RUNS - 1, -1, -1):
         motion = run(rung.by(step=step))
         work = motion.work
-        last = work.solve_seconds
-        seconds += last
+        seconds += work.solve_seconds
+        last = work_done(motion.system, work)
+        counted += last
         apart = compare(motion, exact)
         error = apart.error_until(until) + off
         kept = not work.failed and error <= wanted
@@ -105,7 +107,7 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
         tried = None if work.failed else _Tried(motion.system.step, error)
         step = motion.system.step / (_finer(motion.system, before, tried) if tried else FAILED)
         before = tried
-        if seconds + last * motion.system.step / step > MOST_SECONDS:
+        if counted + last * motion.system.step / step > MOST_WORK:
             break
         steps += work.steps
     work.solve_seconds = seconds

@@ -14,7 +14,7 @@ import numpy as np
 
 from brakecli.runs.certificate import MISSED, ROUNDING, Certificate, Certified, displacement, sizes
 from brakecli.runs.first import FIRST, ORDER_OF_NODES, first_nodes
-from brakecli.runs.work import FINEST, evaluation_work
+from brakecli.runs.work import FINEST, evaluation_work, work_done
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.pad import NODES
 from brakecli.solver.integrate import Motion
@@ -23,8 +23,8 @@ from brakecli.solver.system import MOST_TABLE_BYTES, System
 
 SAFETY = 1.5
 """What is promised, over the error that a run knows; `make statistics` compares that with true ones."""
-MOST_SECONDS = 900.0
-"""Time (s) of the loop after which no finer run is begun; a choice."""
+MOST_WORK = 900.0
+"""Work of all runs, as `runs.work` counts it, after which no finer one is begun; a choice."""
 AIM = 0.4
 """Part of the promise that a finer run leaves to steps, and to nodes."""
 _FAR = 2.0
@@ -99,12 +99,14 @@ def promised(
     wanted = system.method.tolerance
     duration = system.sampled_duration
     seconds = 0.0
+    counted = 0.0
     steps_before = 0
     most = _FAR * wanted / safety
     for left in range(_MOST_RUNS, 0, -1):
         most = most if left > 1 else math.inf
         motion = yield replace(rung, most_error=most)
         seconds += motion.work.solve_seconds
+        counted += work_done(motion.system, motion.work)
         motion.work.coarser_steps = steps_before
         steps_before = motion.work.all_steps
         known = Known.of_run(motion)
@@ -115,7 +117,7 @@ def promised(
         failed = motion.work.failed and not coarse
         until = known.until(wanted / safety, duration)
         certified = not (failed or coarse) and error <= wanted and until >= duration
-        late = seconds > MOST_SECONDS
+        late = counted > MOST_WORK
         if certified or failed or most == math.inf or (late and not coarse):
             break
         surer = _SURER if known.unsure < duration else math.inf

@@ -12,6 +12,7 @@ import numpy as np
 
 from brakecli.analysis.stability.report import FRICTIONS, LARGEST_FRICTION
 from brakecli.errors import CaseError
+from brakecli.solver import integrate
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.schedules import values
 from brakecli.solver.steady_sliding import PLACES, TABLE, averaged_length, fills_window, steady_sliding
@@ -94,6 +95,14 @@ def work_of(system: System) -> Work:
         open_part = _PRESSED if heights * (c.c_yy + system.contact_stiffness) < least_load else _PLAYS
         each += _OWN_EVALUATIONS * open_part * evaluation_work(system)
     return Work(steps, (1.0 if alone else _RUNS) * steps * each)
+
+
+def work_done(system: System, done: integrate.Work) -> float:
+    """The work of a run that was made: of its steps, and of the contact in those that no closed form took."""
+    each = _OWN_STEP_WORK if system.method.own_steps else _STEP_WORK
+    taken = sum(done.evaluators.values())
+    open_part = 1.0 - done.evaluators.get("closed-form", 0) / max(taken, 1)
+    return each * done.steps + open_part * done.contact_evaluations * evaluation_work(system)
 
 
 def held_bytes(system: System) -> float:

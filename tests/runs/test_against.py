@@ -183,7 +183,7 @@ def test_there_are_five_runs_at_most_and_none_that_would_take_too_long(monkeypat
     assert not found.certificate.certified
     assert kept(found, case) == pytest.approx(found.certificate.estimated_error, rel=1e-3)
     assert found.certificate.certified_until < 0.01
-    monkeypatch.setattr(room, "MOST_SECONDS", 0.0)
+    monkeypatch.setattr(room, "MOST_WORK", 0.0)
     made, found = runs_of(system_of(case))
     assert len(made) == 1
     assert not found.certificate.certified

@@ -9,7 +9,7 @@ from brakecli.case.system import system_of
 from brakecli.errors import RefusedError
 from brakecli.runs.judge import motion_of
 from brakecli.runs.limits import MOST_BYTES, check, refuse
-from brakecli.runs.work import stability_work
+from brakecli.runs.work import stability_work, work_done
 from brakecli.solver.history import ROW_BYTES
 from brakecli.solver.system import MOST_STEPS, System
 from tests.examples import SQUEAL, make
@@ -45,6 +45,20 @@ def test_the_memory_of_histories_that_are_compared_is_counted(scheme: str) -> No
 def test_the_steps_of_a_run_with_a_step_are_those_that_it_takes() -> None:
     system = system_of(make(SQUEAL, solver__duration=0.01))
     assert check(system).steps == motion_of(system)[0].work.steps
+
+
+def test_the_work_of_a_run_that_was_made_follows_its_steps_and_its_open_contact() -> None:
+    """A contact in closed form adds none; on nodes, each evaluation adds as much as it has nodes."""
+
+    def done(duration: float, **more: Any) -> float:
+        motion = motion_of(system_of(make(SQUEAL, solver__duration=duration, **more)))[0]
+        return work_done(motion.system, motion.work)
+
+    closed = done(0.01, contact__evaluator="closed-form")
+    assert done(0.02, contact__evaluator="closed-form") == pytest.approx(2.0 * closed, rel=1e-12)
+    few, many = (done(0.01, contact__evaluator="cells", contact__nodes=nodes) for nodes in (64, 128))
+    assert many - closed == pytest.approx(2.0 * (few - closed), rel=1e-12)
+    assert few > closed
 
 
 @pytest.mark.parametrize(
