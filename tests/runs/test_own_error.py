@@ -241,6 +241,15 @@ def test_an_error_that_overflows_is_no_promise(monkeypatch: pytest.MonkeyPatch, 
     assert found.certified_until == 0.0
 
 
+def test_no_finer_run_is_begun_beyond_so_much_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The first run is too coarse; a count that nothing stays below leaves the whole of it."""
+    monkeypatch.setattr(own_error, "FIRST", 5.0)
+    monkeypatch.setattr(own_error, "MOST_WORK", 0.0)
+    found = last_of(by_own_error(system_of(promised(OPEN, 1e-6, solver__duration=0.01))), solve)
+    assert not found.certificate.certified
+    assert len(found.motion.rows) == 101
+
+
 def test_a_promise_that_no_run_keeps_is_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(own_error, "_MOST_RUNS", 1)
     monkeypatch.setattr(own_error, "FIRST", 5.0)
