@@ -89,7 +89,7 @@ class ClusterEngine(Engine):
                 task = running.pop(future)
                 seen = time.monotonic()
                 if finished is not None:
-                    yield finished._replace(task=task)
+                    yield finished
                 elif task.last_try and task is not alone:
                     suspects.append(task)
                 else:
@@ -103,6 +103,7 @@ class ClusterEngine(Engine):
 
     def _submit(self, task: Task) -> Any:
         # What computes, measured profiles included, is a task as well: it travels once, and survives its worker.
+        # Not by dask's own executor, whose futures never end where a result cannot be fetched.
         self._shared = self._shared or self._client.submit(_itself, self.compute, pure=False)
         return self._client.submit(_attempt, self._shared, task, self._versions, pure=False)
 

@@ -5,11 +5,12 @@ records do not depend on the engine, nor on how the units of a sweep were cut in
 """
 
 import time
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import NamedTuple
 
 from brakecli import about
 from brakecli.about import __version__
@@ -42,8 +43,8 @@ NextTask = Callable[[], Task | None]
 """The next task, None where there is none now. It is asked again after each task that has ended."""
 
 
-class Engine(ABC):
-    """Computes tasks by `workers` processes; a context, which ends those that it has started.
+class Engine(AbstractContextManager["Engine"]):
+    """Computes tasks by `workers` processes; a context, at whose end these end, too.
 
     `spare`: the caller may compute the tasks itself, where that takes no longer than workers take to start.
     """
@@ -51,14 +52,6 @@ class Engine(ABC):
     workers: int
     compute: "Compute"
     spare = False
-
-    def __enter__(self) -> Self:
-        """Start nothing yet."""
-        return self
-
-    @abstractmethod
-    def __exit__(self, *error: object) -> None:
-        """End what was started, and drop what is still being computed."""
 
     @abstractmethod
     def run(self, next_task: NextTask) -> Iterator[Finished]:
