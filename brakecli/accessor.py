@@ -1,7 +1,7 @@
 """What `import brakecli` adds to xarray: typed records of a result, and how a notebook shows it.
 
-A result stays an object of xarray, which every function of xarray takes and `to_netcdf` writes. For that, lists of
-objects are JSON among its attributes; `result.brakecli` reads them.
+A result stays an object of xarray, which every function of xarray takes. For that, lists of objects are JSON among
+its attributes; `result.brakecli` reads them, and keeps the result as a file.
 """
 
 import base64
@@ -9,6 +9,8 @@ import html
 import json
 from collections import Counter
 from collections.abc import Sequence
+from os import PathLike
+from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
@@ -20,8 +22,9 @@ from brakecli.analysis.signals.bursts import Burst
 from brakecli.analysis.stability.modes import Crossing, Mode
 from brakecli.analysis.stability.report import Discrete
 from brakecli.errors import BrakecliError
+from brakecli.faces import in_python
 from brakecli.files import fields
-from brakecli.files.as_xarray import stored
+from brakecli.files.as_xarray import save, stored
 from brakecli.files.contents import DIFFERENCE_OF_TWO, Difference
 from brakecli.files.field import Field, values_of
 from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER, STABILITY, THRESHOLDS
@@ -104,12 +107,21 @@ class Differences(Difference, Shown):
 @xr.register_dataset_accessor("brakecli")
 @xr.register_datatree_accessor("brakecli")
 class Accessor(Shown):
-    """`result.brakecli`: typed records of a result of `brakecli`, its table and its picture."""
+    """`result.brakecli`: typed records of a result of `brakecli`, its table, its picture, and its file."""
 
     def __init__(self, found: xr.Dataset | xr.DataTree) -> None:
         """Read nothing yet."""
         self._found = found
         self._groups = dict(found.children) if isinstance(found, xr.DataTree) else {}
+
+    def save(self, path: str | PathLike[str], force: bool = False) -> None:
+        """Keep the result as a file, as the commands write it, which replaces another one where `force` is set.
+
+        It may have been changed since a function gave it: every variable along all of its axes, without infinite
+        numbers, and without NaN in a history. Raises UsageError for what is no result, and CannotWriteError.
+        """
+        with in_python():
+            save(self._found, Path(path), force=force)
 
     @property
     def reasons(self) -> tuple[str, ...]:

@@ -78,7 +78,7 @@ class RefusedError(BrakecliError, exit_code=3):
 
 
 class UnreadableResultError(BrakecliError, exit_code=4):
-    """A result file cannot be read, or must not be trusted."""
+    """A result file cannot be read, or is not as it was written."""
 
 
 class OtherKindError(UnreadableResultError, exit_code=4):

@@ -10,7 +10,7 @@ from brakecli.errors import UsageError
 
 _PYTHON: ContextVar[bool] = ContextVar("python", default=False)
 _SHORT = {"output": "-o"}
-_ARGUMENTS = {"force": "force=True", "force-read": "force_read=True", "set": "setting", "threshold": "thresholds"}
+_ARGUMENTS = {"force": "force=True", "set": "setting", "threshold": "thresholds"}
 
 
 @contextmanager

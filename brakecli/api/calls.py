@@ -1,4 +1,4 @@
-"""Around each call from Python: interruptions, what digests say, warnings, progress, and results as files."""
+"""Around each call from Python: interruptions, warnings, progress, and results as files."""
 
 import tempfile
 import threading
@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from brakecli.errors import UsageError, found
 from brakecli.faces import in_python
-from brakecli.files.trust import readings
 from brakecli.stop import signals_shown
 
 if TYPE_CHECKING:
@@ -24,28 +23,21 @@ if TYPE_CHECKING:
 
 
 @contextmanager
-def interruptible() -> Iterator[None]:
-    """Let Ctrl-C end compiled code, too; other threads hear no signals."""
-    hears = threading.current_thread() is threading.main_thread()
-    with signals_shown() if hears else nullcontext(), in_python():
-        yield
+def called() -> Iterator[None]:
+    """Around each call: Ctrl-C ends compiled code, too, but in other threads, which hear no signals.
 
-
-@contextmanager
-def readings_told(*, force_read: bool = False) -> Iterator[None]:
-    """Warn of results that no digest vouches for, and forget them at the end."""
-    import brakecli.accessor  # noqa: F401 - which xarray objects have from then on
+    Objects of xarray have the accessor from then on. Arrays that are profiles of surfaces are forgotten at the end.
+    """
+    import brakecli.accessor  # noqa: F401
     from brakecli.case.roughness import arrays
 
-    said = list[str]()
+    hears = threading.current_thread() is threading.main_thread()
     before = arrays.set({})
-    readings.begin(said.append, forced=force_read)
     try:
-        yield
+        with signals_shown() if hears else nullcontext(), in_python():
+            yield
     finally:
-        readings.begin()
         arrays.reset(before)
-    warn(said, 5)  # the caller of who uses this block
 
 
 class _OfCaller(BaseException):
@@ -112,7 +104,7 @@ def as_files(results: "Iterable[Result]", *names: str) -> Iterator[list[Path]]:
         yield files
 
 
-def warn(texts: Iterable[str], frames: int = 3) -> None:
+def warn(texts: Iterable[str]) -> None:
     """Warn of each text, at the line of whoever called the function of `import brakecli`."""
     for text in texts:
-        warnings.warn(text, stacklevel=frames)
+        warnings.warn(text, stacklevel=3)

@@ -6,7 +6,7 @@ from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from brakecli.api.calls import as_files, interruptible, readings_told, target, telling_to, warn
+from brakecli.api.calls import as_files, called, target, telling_to, warn
 from brakecli.api.given import axis_of, case_of, ends_of, mapping, margin_of, patterns_of, pushes_of, study_of
 from brakecli.branches.pushes import PUSHES
 from brakecli.errors import BrakecliError, UsageError
@@ -49,7 +49,7 @@ def run(
 
     A run that is not sure to keep its tolerance warns, as all that `brakecli run` warns of is a `UserWarning`.
     """
-    with interruptible(), readings_told(), target(output) as path, telling_to(progress) as tell:
+    with called(), target(output) as path, telling_to(progress) as tell:
         loaded = case_of(case, settings)
         from brakecli.files.as_xarray import opened
         from brakecli.runs.run import run
@@ -58,7 +58,7 @@ def run(
         warn(report.warnings)
         if report.motion.work.failed:
             raise BrakecliError(str(report.motion.work.failure_sentence))
-        return opened(path, own=True)
+        return opened(path)
 
 
 def stability(
@@ -88,7 +88,7 @@ def stability(
     Raises:
         CaseError, UsageError, RefusedError: as `brakecli stability`.
     """
-    with interruptible(), readings_told(), telling_to(progress) as tell:
+    with called(), telling_to(progress) as tell:
         loaded = case_of(case, settings)
         from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.field import values_of
@@ -111,7 +111,7 @@ def stability(
         with target(None) as path:
             found = lock_in(loaded, axis_of(vary), "vary", tell)
             write(path, loaded, found, force=False)
-            return opened(path, own=True).to_dataset()
+            return opened(path).to_dataset()
 
 
 def branch(
@@ -150,7 +150,7 @@ def branch(
     Raises:
         CaseError, UsageError, RefusedError, CannotWriteError, UnreadableResultError: as `brakecli branch`.
     """
-    with interruptible(), readings_told(), target(output) as path, telling_to(progress) as tell:
+    with called(), target(output) as path, telling_to(progress) as tell:
         loaded = case_of(case, settings)
         from brakecli.branches.explore import Explorer
         from brakecli.files.as_xarray import opened
@@ -171,7 +171,7 @@ def branch(
             states = states_of(line, [start_of(file, keys) for file in files])
         found = branch(Explorer(line, tell), states, switch, pushes_of(pushes))
         write(path, loaded, found, unit(keys[0]), force=force)
-        return opened(path, own=True)
+        return opened(path)
 
 
 def advise(
@@ -205,7 +205,7 @@ def advise(
     Raises:
         CaseError, UsageError, RefusedError: as `brakecli advise`.
     """
-    with interruptible(), readings_told(), telling_to(progress) as tell:
+    with called(), telling_to(progress) as tell:
         loaded = case_of(case, settings)
         from brakecli.accessor import Advice
         from brakecli.analysis.stability.advice import KEYS

@@ -6,7 +6,7 @@ from functools import partial
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from brakecli.api.calls import interruptible, readings_told, target, telling_to, warn
+from brakecli.api.calls import called, target, telling_to, warn
 from brakecli.api.given import (
     axes_of,
     case_of,
@@ -71,7 +71,7 @@ def sweep(
         CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli sweep`.
     """
     refuse_jobs(jobs)
-    with interruptible(), readings_told(), target(output) as path, telling_to(progress) as tell:
+    with called(), target(output) as path, telling_to(progress) as tell:
         from brakecli.files import fields
         from brakecli.files.as_xarray import opened
         from brakecli.files.field import values_of
@@ -104,7 +104,7 @@ def sweep(
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             warn([f"{failed}, the first: {found[0]['reason']}"])
-        result = opened(path, own=True).to_dataset()  # without groups
+        result = opened(path).to_dataset()  # without groups
         if report.findings.attractors is not None:
             known = [values_of(fields.ATTRACTOR, each) for each in report.findings.attractors]
             result.attrs["attractors"] = json.dumps(known)
@@ -140,7 +140,7 @@ def scatter(
         CaseError, UsageError, RefusedError, CannotWriteError: as `brakecli scatter`.
     """
     refuse_jobs(jobs)
-    with interruptible(), readings_told(), target(output) as path, telling_to(progress) as tell:
+    with called(), target(output) as path, telling_to(progress) as tell:
         from brakecli.files.as_xarray import opened
         from brakecli.scattering.scatter import engine_for, scatter
 
@@ -151,4 +151,4 @@ def scatter(
             warn(
                 [f"{report.failed} of {report.samples} samples have no answer, the first: {report.first_failure}"]
             )
-        return opened(path, own=True).to_dataset()
+        return opened(path).to_dataset()

@@ -5,10 +5,9 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.api.calls import as_files, interruptible, readings_told, target, telling_to, warn
+from brakecli.api.calls import as_files, called, target, telling_to, warn
 from brakecli.api.given import chosen_of, measured_of, overrides, path_of, text_of
 from brakecli.errors import UsageError
-from brakecli.faces import in_python
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -19,13 +18,12 @@ if TYPE_CHECKING:
     from brakecli.api.given import Settings
 
 
-def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, force_read: bool = False) -> Any:
+def load(source: "str | PathLike[str]", settings: "Settings | None" = None) -> Any:
     """What a file holds: a case, a sweep or a study, for the other functions, or a result as an `xarray.DataTree`.
 
     Args:
         source: path of a case file, a sweep file, a study, or a result file of any kind.
         settings: keys of the case to change, as `{"friction.coefficient": 0.4}`; of a result none.
-        force_read: look at a result whose digest does not fit; its attribute `digest` and a warning say so.
 
     Raises:
         CaseError: the case or a setting is wrong; holds every problem.
@@ -34,7 +32,7 @@ def load(source: "str | PathLike[str]", settings: "Settings | None" = None, *, f
     from brakecli.front.inputs import is_result, kind_of_file, load_case, load_study, load_sweep
 
     name = path_of(source)
-    with in_python(), readings_told(force_read=force_read):
+    with called():
         if is_result(name):
             if settings:
                 raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
@@ -52,7 +50,6 @@ def classify(
     belt_speed: float | None = None,
     stiffness: float | None = None,
     thresholds: "Mapping[str, float] | None" = None,
-    force_read: bool = False,
     **reading: Any,
 ) -> "xr.Dataset":
     """Regime of a stored run, or of a measured signal, with evidence.
@@ -63,7 +60,6 @@ def classify(
         belt_speed: speed of the wheel's surface (m/s), if known.
         stiffness: stiffness behind a measured force (N/m), if known.
         thresholds: those to change, by name.
-        force_read: look at a result whose digest does not fit; a warning says so.
         reading: how a file is read: `column`, `time_column`, `sample_rate` (Hz), `unit`, `time_unit`.
 
     Returns:
@@ -81,7 +77,7 @@ def classify(
         raise UsageError("classify: second_run: there is none any more; every verdict asks what it asked")
     changes = chosen_of(thresholds, "thresholds")
     measured = measured_of("classify", quantity, belt_speed, stiffness, reading)
-    with interruptible(), readings_told(force_read=force_read), as_files([source], "result") as (file,):
+    with called(), as_files([source], "result") as (file,):
         numbers = verdict_on(str(file), measured, changes)
     warn(numbers.get("warnings", ()))
     return dataset((*VERDICT, *EXPONENT, UNIT), numbers)
@@ -98,7 +94,6 @@ def plot(
     belt_speed: float | None = None,
     stiffness: float | None = None,
     force: bool = False,
-    force_read: bool = False,
     **reading: Any,
 ) -> "Figure":
     """Draw a result of any kind, or a measured signal, as `brakecli.plot(brakecli.run("squeal.toml"))`.
@@ -114,7 +109,6 @@ def plot(
         belt_speed: of a signal: speed of the wheel's surface (m/s), if known.
         stiffness: of a signal: stiffness behind a measured force (N/m), if known.
         force: replace that file if it exists.
-        force_read: look at a result whose digest does not fit; the picture says so.
         reading: how a signal is read, as for `classify`.
 
     Returns:
@@ -129,8 +123,7 @@ def plot(
     shown = text_of(variable, "variable")
     cut = text_of(section, "section")
     with (
-        interruptible(),
-        readings_told(force_read=force_read),
+        called(),
         target(output, "picture.png") as path,
         as_files([result], "result") as (file,),
     ):
@@ -150,7 +143,6 @@ def report(
     full: bool = False,
     progress: "Progress" = False,
     force: bool = False,
-    force_read: bool = False,
 ) -> str:
     """Put results on one page, answer first, as `brakecli.report(result, output="report.html")`.
 
@@ -161,7 +153,6 @@ def report(
         full: add the case, the evidence, accuracy, warnings, and how to repeat it.
         progress: as for `run`.
         force: replace that file if it exists.
-        force_read: look at results whose digest does not fit; the page says so.
 
     Returns:
         The page as HTML that is complete in itself, also where a PDF is written.
@@ -173,8 +164,7 @@ def report(
     if not results:
         raise UsageError("report: there is no result; give one or more")
     with (
-        interruptible(),
-        readings_told(force_read=force_read),
+        called(),
         target(output, "report.html") as path,
         telling_to(progress) as tell,
         as_files(results, "result") as files,
@@ -193,7 +183,6 @@ def diff(
     output: "str | PathLike[str] | None" = None,
     variable: str | None = None,
     force: bool = False,
-    force_read: bool = False,
 ) -> "Differences":
     """How a second result differs from a first one: case, numbers, curves, as `brakecli.diff(first, second).same`.
 
@@ -203,7 +192,6 @@ def diff(
         output: a picture of both to write, .png, .pdf or .svg; none if left out.
         variable: what is drawn of two runs, `vx` if left out, or of two other results.
         force: replace that file if it exists.
-        force_read: look at results whose digest does not fit.
 
     Returns:
         A record: `same`; `case`, `numbers`, `variables` and `versions`, lists of what differs, by the names of
@@ -214,8 +202,7 @@ def diff(
     """
     shown = text_of(variable, "variable")
     with (
-        interruptible(),
-        readings_told(force_read=force_read),
+        called(),
         target(output) as path,
         as_files([first, second], "a", "b") as files,
     ):

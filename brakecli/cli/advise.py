@@ -4,7 +4,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, CaseArgument, Details, ForceRead, Overrides, Quiet, option
+from brakecli.cli.options import AsJson, CaseArgument, Details, Overrides, Quiet, option
 from brakecli.cli.output import show_result, warn
 from brakecli.front.inputs import load_case, load_study
 from brakecli.front.progress import telling
@@ -20,7 +20,6 @@ def command(
     keys: Annotated[str | None, option(KEYS, "KEY,…")] = None,
     margin: Annotated[float, option(MARGIN, "PART", min=0.0, max=10.0)] = 0.2,
     scatter: Annotated[str | None, option(STUDY, "STUDY.toml", "--scatter")] = None,
-    force_read: ForceRead = False,
     details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

@@ -19,7 +19,6 @@ from brakecli.cli.options import option
 from brakecli.cli.output import announce_compilation, show, showing_compilation, warn
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.faces import as_argument
-from brakecli.files.trust import readings
 from brakecli.front.progress import say
 from brakecli.solver import compiling
 
@@ -120,15 +119,11 @@ CITE = option(
 
 
 @app.callback()
-def _common(
-    context: typer.Context, version: Annotated[bool, VERSION] = False, cite: Annotated[bool, CITE] = False
-) -> None:
+def _common(version: Annotated[bool, VERSION] = False, cite: Annotated[bool, CITE] = False) -> None:
     compiling.set_alone()
     compiling.set_notice(announce_compilation)
     compiling.set_progress(showing_compilation)
     compiling.set_warning(warn)
-    readings.begin(warn)
-    context.call_on_close(readings.begin)  # a later call of the same process forgets what this one has read
     limit, _ = resource.getrlimit(resource.RLIMIT_AS)
     if limit == resource.RLIM_INFINITY:
         return

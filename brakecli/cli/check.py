@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, ForceRead, Overrides, Quiet, source_argument
+from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
 from brakecli.cli.output import show_result, warn
 from brakecli.front.inputs import kind_of_file, load_case, load_sweep
 
@@ -15,7 +15,6 @@ OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_
 def command(
     file: Annotated[str, source_argument("FILE.toml", 'Case or sweep file, or "-" for standard input.')],
     overrides: Overrides = None,
-    force_read: ForceRead = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

@@ -4,7 +4,7 @@ from functools import partial
 from typing import Annotated
 
 from brakecli.cli.measured import UNMEASURED, with_measured
-from brakecli.cli.options import AsJson, Details, ForceRead, Quiet, option, source_argument
+from brakecli.cli.options import AsJson, Details, Quiet, option, source_argument
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.front.measured import Measured
@@ -23,7 +23,6 @@ def command(
     measured: Measured = UNMEASURED,
     thresholds: Annotated[list[str] | None, THRESHOLD] = None,
     second_run: Annotated[bool, option("Gone.", None, "--second-run", hidden=True)] = False,
-    force_read: ForceRead = False,
     details: Details = False,
     as_json: AsJson = False,
     quiet: Quiet = False,

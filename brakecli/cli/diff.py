@@ -4,7 +4,7 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, Details, Force, ForceRead, Quiet, option, output_option, source_argument
+from brakecli.cli.options import AsJson, Details, Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show_result
 
 VARIABLE = "What is drawn of two runs, vx if left out, or of two other results."
@@ -15,7 +15,6 @@ def command(
     second: Annotated[Path, source_argument("B.h5", "Result of the same kind.")],
     output: Annotated[Path | None, output_option("Picture of both", "none")] = None,
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
-    force_read: ForceRead = False,
     force: Force = False,
     details: Details = False,
     as_json: AsJson = False,

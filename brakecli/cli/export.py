@@ -4,7 +4,7 @@ import math
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
+from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.front.inputs import result_path
 
@@ -20,7 +20,6 @@ def command(
     start: Annotated[float | None, option("First time in s, of what has a time.", "S", "--from")] = None,
     end: Annotated[float | None, option("Last time in s.", "S", "--to")] = None,
     every: Annotated[int, option("Keep one of so many samples, the first one among them.", "N", min=1)] = 1,
-    force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

@@ -4,13 +4,12 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.check import command as check
-from brakecli.cli.options import AsJson, ForceRead, source_argument
+from brakecli.cli.options import AsJson, source_argument
 from brakecli.cli.output import show_result
 
 
 def command(
     file: Annotated[str, source_argument("FILE", "Result of any kind; of a case or a sweep what `check` says.")],
-    force_read: ForceRead = False,
     as_json: AsJson = False,
 ) -> None:
     """What a result holds, whether it is whole, what made it."""

@@ -6,7 +6,6 @@ import typer
 
 from brakecli.branches.pushes import MOST_PUSHES
 from brakecli.cli.output import warn
-from brakecli.files.trust import readings
 from brakecli.solver import compiling
 
 
@@ -45,6 +44,4 @@ Details = Annotated[
 ]
 QUIET = option("Print nothing but warnings and errors.", None, "--quiet", "-q", callback=_compile_in_silence)
 Quiet = Annotated[bool, QUIET]
-FORCE_READ = "Look at a result whose digest does not fit, as of a damaged file; what is made of it says so."
-ForceRead = Annotated[bool, option(FORCE_READ, None, "--force-read", callback=readings.force)]
 Force = Annotated[bool, option("Replace an existing output.", None, "--force")]

@@ -7,7 +7,6 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
 from brakecli.files.os_signals import Styled
-from brakecli.files.trust import readings
 from brakecli.front.progress import say, telling
 
 if TYPE_CHECKING:
@@ -37,7 +36,7 @@ def show_result(
 ) -> None:
     """Print what a command has found: its numbers as JSON, or its view, with all `details`; or nothing."""
     if as_json:
-        show_json({"command": command, **readings.noted(), **numbers})
+        show_json({"command": command, **numbers})
     elif not quiet:
         from brakecli.views.render import EXACT, TERMINAL
         from brakecli.views.terminal import terminal_text

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.measured import UNMEASURED, with_measured
-from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
+from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError
 from brakecli.faces import as_argument
@@ -31,7 +31,6 @@ def command(
     variable: Annotated[str | None, option(VARIABLE, "NAME")] = None,
     section: Annotated[str | None, option(SECTION, "NAME")] = None,
     measured: Measured = UNMEASURED,
-    force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import Force, ForceRead, Quiet, option, output_option, source_argument
+from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show
 from brakecli.front.progress import telling
 
@@ -17,7 +17,6 @@ def command(
         Path | None, output_option("Page, .html, or .pdf with weasyprint", "report.html, here")
     ] = None,
     full: Annotated[bool, option(FULL, None, "--full")] = False,
-    force_read: ForceRead = False,
     force: Force = False,
     quiet: Quiet = False,
 ) -> None:

@@ -8,7 +8,6 @@ from brakecli.cli.options import (
     AsJson,
     Details,
     Force,
-    ForceRead,
     Overrides,
     Quiet,
     output_option,
@@ -26,7 +25,6 @@ def command(
     case: Annotated[str, source_argument("CASE.toml", SOURCE)],
     output: Annotated[Path | None, output_option("Result file", "the case's name with .h5, here")] = None,
     overrides: Overrides = None,
-    force_read: ForceRead = False,
     force: Force = False,
     details: Details = False,
     as_json: AsJson = False,
@@ -45,6 +43,7 @@ def command(
         say(*report.check.adjustments)
     warn(*report.warnings)
     numbers = {"output": str(report.output), **origin("run", report.title, report.loaded), **report.numbers()}
+    del numbers["case_toml"]  # which `resolved_toml` says in full
     view = partial(of_run, numbers, report.title, str(report.output))
     show_result("run", numbers, view, as_json=as_json, quiet=quiet, details=details)
     if report.motion.work.failed:

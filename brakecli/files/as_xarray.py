@@ -8,89 +8,87 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import h5py
+import numpy as np
 import xarray as xr
 
-from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files import valid
+from brakecli.errors import BrakecliError, UsageError
 from brakecli.files.field import Field
-from brakecli.files.read import StoredResult, open_result
-from brakecli.files.trust import MISSING, readings
+from brakecli.files.read import explained, open_result
+from brakecli.files.valid import declared_attributes
+from brakecli.files.write import ResultFile, new_result
+
+_WITHOUT_GAPS = ("history", "spectrum", "spectrogram", "events")
+"""Groups of a run in which no number is missing."""
 
 
-def opened(path: Path, *, own: bool = False) -> xr.DataTree:
-    """A result file in memory, checked; what other programs have put there may be more than xarray takes.
+def opened(path: Path) -> xr.DataTree:
+    """A result file in memory. A run without a frequency has NaN as its attribute `frequency`, as no file has."""
+    with open_result(path) as result, explained(path):
+        result.stream.seek(0)
+        with xr.open_datatree(result.stream, engine="h5netcdf") as tree:
+            found: xr.DataTree = tree.load()
+    if found.attrs["kind"] == "run":
+        found.attrs.setdefault("frequency", math.nan)
+    return found
 
-    A run without a frequency has NaN as its attribute `frequency`; no file holds that.
-    A file that this program has just written (`own`) has no limit of memory.
-    """
+
+def save(found: xr.Dataset | xr.DataTree, path: Path, *, force: bool = False) -> None:
+    """Keep a result in memory as a file; raises UsageError for what is no whole result, and CannotWriteError."""
     try:
-        with open_result(path) as result:
-            _check(result, own=own)
-            result.stream.seek(0)
-            with xr.open_datatree(result.stream, engine="h5netcdf", phony_dims="access") as tree:
-                found: xr.DataTree = tree.load()
-            found.attrs |= readings.noted()
-            if found.attrs.get("kind") == "run":
-                found.attrs.setdefault("frequency", math.nan)
-            for node in found.subtree:  # of results that xarray has saved; those of ours are read as str
-                for name in [str(name) for name, each in node.variables.items() if each.dtype.kind == "S"]:
-                    texts = node[name].astype(str).astype(object)
-                    texts.encoding["dtype"] = "S1"  # so that a copy of the copy has the same form
-                    node[name] = texts
-            return found
-    except (ValueError, TypeError, LookupError, AttributeError, OSError, RuntimeError, MemoryError) as error:
-        reason = repr(error) if isinstance(error, LookupError) else error
-        what = f"{path}: xarray cannot read what it holds: {reason}"
-        raise UnreadableResultError(f"{what}; compute the result again") from error
+        tree = found if isinstance(found, xr.DataTree) else xr.DataTree(found)
+        if not isinstance(kind := tree.attrs.get("kind"), str):
+            raise ValueError("attribute kind is missing, as of a part of a result")
+        with new_result(path, force=force) as result:
+            for node in tree.subtree:
+                _write(result, node, kind)
+            result.finish()
+            result.publish()
+    except (ValueError, TypeError) as error:
+        remedy = "give all that a function of brakecli gave, with finite numbers, selected by lists or slices"
+        raise UsageError(f"{path}: is no result that can be kept: {error}; {remedy}") from error
+
+
+def _write(result: ResultFile, node: xr.DataTree, kind: str) -> None:
+    """Write a group; ValueError and TypeError tell what a result cannot hold."""
+    group = node.path.strip("/") or "/"
+    known = declared_attributes(kind, group)
+    for name, value in node.attrs.items():
+        if isinstance(value, np.ndarray) and value.dtype.kind not in "iuf":
+            value = value.tolist()
+        if (
+            name in known and known[name].is_list and np.ndim(value) == 0
+        ):  # xarray takes a list of one for its item
+            value = np.array([value]) if known[name].units else [value]
+        if not (isinstance(value, float) and math.isnan(value)):  # a number that does not exist
+            result.set_attributes({name: value}, group)
+    held = node.to_dataset(inherit=False)
+    axes = {
+        name: node.coords.get(name, xr.DataArray(np.arange(size), dims=name)) for name, size in held.sizes.items()
+    }
+    for name, each in {**axes, **{name: held[name] for name in held.variables if name not in axes}}.items():
+        about = dict(each.attrs)
+        values = each.values
+        if values.dtype.kind in "OT" and all(isinstance(text, str) for text in values.flat):
+            values = values.astype(np.str_)
+        form = {"f": "f8", "U": "S"}.get(values.dtype.kind, values.dtype.str)
+        field = Field(str(name), about.pop("units", ""), about.pop("long_name", str(name)), form)
+        if name in axes or group in _WITHOUT_GAPS:
+            result.variable(group, field, each.dims, values, **about)
+        else:
+            result.column(field, each.dims, values, group, **about)
 
 
 @contextmanager
 def stored(found: xr.Dataset | xr.DataTree, name: str) -> Iterator[Path]:
-    """A result in memory as a file of this name, within the block; messages call it by its name.
-
-    Raises UsageError where xarray cannot write it. What comes from a file whose digest does not fit stays marked.
-    """
+    """A result in memory as a file of this name, within the block; messages call it by its name."""
     with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:
         path = Path(folder) / name
-        found = found.copy(deep=False)
-        found.attrs = {key: each for key, each in found.attrs.items() if not _missing(each)}
         try:
-            found.to_netcdf(path, engine="h5netcdf")
-        except (ValueError, TypeError, OSError, RuntimeError) as error:
-            raise UsageError(f"{name}: xarray cannot write it as a file: {error}") from error
-        before = readings.unchecked
-        readings.unchecked = before | {str(path): MISSING, name: str(found.attrs.get("digest", MISSING))}
-        try:
+            save(found, path)
             yield path
         except BrakecliError as error:
             error.args = (str(error).replace(f"{folder}/", ""),)
             raise
-        finally:
-            readings.unchecked = before
-
-
-def _missing(value: Any) -> bool:
-    """Whether an attribute stands for a number that does not exist."""
-    return isinstance(value, float) and math.isnan(value)
-
-
-def _check(result: StoredResult, *, own: bool) -> None:
-    """Raise ValueError where xarray would follow links, or need more memory than the file can stand for."""
-    needed = 0
-    for name, node in result.nodes.items():
-        if isinstance(node, h5py.Group):
-            result.variables(name)  # damaged axes end xarray without a word
-            for inner in node:
-                if valid.member(node, inner) is None or f"{name}/{inner}".lstrip("/") not in result.nodes:
-                    raise ValueError(f"the group {name} holds {inner}, which is a link, or stands elsewhere, too")
-        elif isinstance(node, h5py.Dataset) and not valid.is_axis_alone(node):
-            if node.dtype.kind == "O":  # all entries may refer to one very long text
-                raise ValueError(f"{name} holds texts or lists of any length")
-            valid.check_size(node, result.length, name)
-            each = node.dtype.itemsize + 64 * (node.dtype.kind == "S")  # a text is an object
-            needed += 0 if own else node.size * each * valid.packed(node)
-    valid.check_memory(needed, "all of it")
 
 
 def dataset(declared: Iterable[Field], numbers: Mapping[str, Any]) -> xr.Dataset:

@@ -11,15 +11,13 @@ import numpy as np
 from brakecli.errors import CaseError, UnreadableResultError, UsageError, printable
 from brakecli.files.field import Field, flat, integer, named, plain, plain_units, ratio
 from brakecli.files.fields import COMPARISON, OBJECT, RUN, SWEEP, TEXT, WELCH
-from brakecli.files.read import StoredResult, Variable
+from brakecli.files.read import BLOCK, StoredResult, Variable
 from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER
 from brakecli.files.toml_lines import parse
-from brakecli.files.valid import BLOCK
 from brakecli.files.write import FILL
 
 _CASES = ("resolved_toml", "resolved_sweep_toml", "resolved_study_toml")
 _APART = {
-    "_NCProperties",
     "case_toml",
     "sweep_toml",
     "study_toml",
@@ -55,7 +53,7 @@ INFO = (
     *named(RUN, "status"),
     Field("kind", "", "run, sweep, comparison, stability, branch or scatter", TEXT),
     Field("title", "", "title of the case or of the sweep", TEXT),
-    Field("whole", "", "whether every byte is as it was written; false where no digest vouches for that", "?"),
+    Field("whole", "", "whether every byte is as it was written; any other file is refused", "?"),
     integer("bytes", "size of the file"),
     integer("format_version", "version of the form of the file"),
     Field("versions", "", "versions of brakecli and of the libraries that made it", OBJECT),
@@ -98,7 +96,7 @@ def contents(result: StoredResult) -> dict[str, Any]:
             held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
     attributes = result.attributes
     known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
-    sizes = {"whole": result.sealed, "bytes": result.length}
+    sizes = {"whole": True, "bytes": result.length}
     return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
 
 
@@ -152,7 +150,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
         for group in groups:
             for name, value in result.group_attributes(group).items() if group in result.groups else ():
                 if name not in _APART and not name.endswith("_version"):
-                    value = plain(value)  # xarray saves a number as a list of one
+                    value = plain(value)  # xarray takes a list of one for a number
                     value = value[0] if isinstance(value, list) and len(value) == 1 else value
                     found[name if group == "/" else f"{group}/{name}"] = value
     declared = _DECLARED.get(kinds[0], ())
@@ -196,10 +194,7 @@ def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
     """The variables of a group that differ, at the same places along their axis."""
-    known = []
-    for result in (a, b):  # what other programs have added need not have units
-        there = result.variables(group) if group in result.groups else {}
-        known.append({name: each for name, each in there.items() if "units" in each.attributes})
+    known = [each.variables(group) if group in each.groups else {} for each in (a, b)]
     for name in dict.fromkeys([*known[0], *known[1]]):
         held = [each[name] for each in known if name in each]
         shapes = [list(each[name].shape) if name in each else [] for each in known]

@@ -17,7 +17,6 @@ from brakecli.files import fields, stability_fields
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.field import labelled, plain_units
 from brakecli.files.read import StoredResult, Variable
-from brakecli.files.trust import readings
 from brakecli.files.write import FILL
 
 RATE = 44_100  # samples of sound per second
@@ -97,12 +96,8 @@ def export(
         raise UsageError(f"{ends}: are for what has a time, as the history of a run; leave them out")
     if suffix == ".wav" and part.every > 1:
         raise UsageError(f"{argument('every')}: would bend the tones of a sound; leave it out")
-    mark = readings.mark()
-    if suffix == ".wav" and mark:
-        raise UsageError(f"{target}: a sound cannot say that it was {mark}; export .csv")
     with new_output(target, force=force) as file:
         notes = list[str]()
-        file.write(f"# {mark}\n".encode() * bool(mark))
         if suffix == ".wav":
             sound, notes = _sound(result, names[0] if names else "vx", part)
             file.write(sound)

@@ -10,6 +10,8 @@ import numpy as np
 
 LARGEST = 1e150
 """Magnitude of numbers that say something: the squares of larger ones overflow. What is beyond it is missing."""
+LARGEST_SQUARE = 1e300
+"""Magnitude in variables that hold squares, as spectra do."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +39,11 @@ class Field:
     def is_flag(self) -> bool:
         """Whether its number means yes or no."""
         return "(0, 1)" in self.meaning
+
+    @property
+    def is_list(self) -> bool:
+        """Whether a file holds it as a list."""
+        return self.kind == "O" and not self.rows
 
     @property
     def is_part_of_time(self) -> bool:

@@ -16,11 +16,11 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brakecli.errors import CannotWriteError, UsageError
+from brakecli.errors import CannotWriteError, UsageError, found
 from brakecli.faces import argument
 from brakecli.files import valid
 from brakecli.files.atomic import OutputFile, new_output
-from brakecli.files.field import Field
+from brakecli.files.field import LARGEST_SQUARE, Field
 from brakecli.files.opening import is_hdf5
 from brakecli.files.os_signals import signals_deferred
 from brakecli.files.read import FORMAT, FORMAT_VERSION, digest
@@ -43,8 +43,8 @@ class _Variable:
 class ResultFile:
     """A result file that is being written. A group is named by its path, the root by ``/``.
 
-    What readers would refuse is refused with ValueError, by the checks of `valid`, which are theirs. Once a write
-    has failed, every method raises CannotWriteError.
+    What readers could not rely on is refused with ValueError, by the checks of `valid`. Once a write has failed,
+    every method raises CannotWriteError.
     """
 
     def __init__(self, output: OutputFile) -> None:
@@ -87,7 +87,7 @@ class ResultFile:
         """Write a variable whose numbers may be missing: None, NaN, or too large to say anything."""
         if field.kind == "f8":
             numbers = np.asarray(values, dtype=np.float64)
-            values = np.where(np.abs(numbers) <= valid.LARGEST_SQUARE, numbers, FILL)
+            values = np.where(np.abs(numbers) <= LARGEST_SQUARE, numbers, FILL)
             attributes = {"_FillValue": np.array([FILL]), **attributes}
         self.variable(group, field, dims, values, **attributes)
 
@@ -192,8 +192,17 @@ class ResultFile:
     def commit(self) -> None:
         """Finish the file and put it in its place; nothing can be written after that.
 
-        Raises CannotWriteError, too, where readers would refuse it, which is a fault of this program.
+        Raises CannotWriteError, too, where readers could not rely on it, which is a fault of this program.
         """
+        try:
+            self.finish()
+        except ValueError as error:
+            what = f"{self._output.path}: is not written, as nothing could read it ({error})"
+            raise CannotWriteError(f"{what}; report the case, as this is a fault of the program") from error
+        self.publish()
+
+    def finish(self) -> None:
+        """Write what waits, and raise ValueError where readers could not rely on what is written."""
         with self._hdf5():
             for group, growing in self._growing.items():
                 for variable in growing.values():
@@ -202,12 +211,10 @@ class ResultFile:
             self._file.attrs["complete"] = 1
         with self._hdf5():
             self._file.flush()
-            try:
-                kind = str(valid.plain_attribute(self._file, "kind"))
-                valid.check_result(self._file, kind, self._output.seek(0, 2))
-            except ValueError as error:
-                what = f"{self._output.path}: is not written, as nothing could read it ({error})"
-                raise CannotWriteError(f"{what}; report the case, as this is a fault of the program") from error
+            valid.check_result(self._file)
+
+    def publish(self) -> None:
+        """Put the finished file in its place, with its digest; nothing can be written after that."""
         self.close()
         self._output.write(digest(self._output, self._output.seek(0, 2)))
         self._output.publish()
@@ -309,7 +316,7 @@ def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
 def _finite(name: str, values: ArrayLike) -> NDArray[Any]:
     array = np.asarray(values)
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be finite numbers, or text (found {values!r})")
+        raise ValueError(f"{name}: must be finite numbers, or text{found(values)}")
     return array
 
 

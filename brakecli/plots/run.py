@@ -16,8 +16,7 @@ from brakecli.case.read import LoadedCase, parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError
 from brakecli.faces import argument
-from brakecli.files.read import StoredResult
-from brakecli.files.valid import BLOCK
+from brakecli.files.read import BLOCK, StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
 from brakecli.plots.stop import Stop, draw_amplitude, draw_spectrogram

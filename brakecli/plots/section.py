@@ -9,8 +9,7 @@ from scipy.interpolate import CubicHermiteSpline
 from brakecli.case.system import system_of
 from brakecli.errors import UsageError
 from brakecli.faces import argument
-from brakecli.files.read import StoredResult
-from brakecli.files.valid import BLOCK
+from brakecli.files.read import BLOCK, StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import scaled
 from brakecli.plots.run import case_of

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from brakecli.errors import UnreadableResultError
 from brakecli.files.field import labelled as labelled
 from brakecli.files.read import StoredResult
-from brakecli.files.trust import readings
 from brakecli.files.write import FILL
 from brakecli.views.render import prefixed as prefixed
 
@@ -86,8 +85,6 @@ def rendered(figure: Figure, suffix: str, dpi: int = 150) -> bytes:
     figure.set_layout_engine(None)
     for axes in figure.axes:  # the layout's last digits depend on the order in which it solved for them
         axes.set_position(tuple(round(bound, 6) for bound in axes.get_position().bounds))
-    if mark := readings.mark():
-        figure.text(0.995, 0.005, mark, ha="right", va="bottom", color=VERMILION, size=8.0)
     stream = BytesIO()
     figure.savefig(stream, format=suffix[1:], dpi=dpi, metadata=_UNDATED.get(suffix))
     return stream.getvalue()

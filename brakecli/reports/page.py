@@ -13,7 +13,6 @@ from brakecli.about import __version__
 from brakecli.errors import UsageError, installed, printable
 from brakecli.files.atomic import check_target, new_output
 from brakecli.files.read import StoredResult, open_result
-from brakecli.files.trust import readings
 
 if TYPE_CHECKING:
     from brakecli.reports.blocks import Part
@@ -74,7 +73,6 @@ def write_report(
             script=script,
             digest=digest,
             version=__version__,
-            mark=readings.mark(),
         )
         data = printed(page)
         if len(data) >= LARGEST:

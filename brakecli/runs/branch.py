@@ -18,8 +18,7 @@ from brakecli.case.restart import last_of
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 from brakecli.files import stability_fields as fields
-from brakecli.files.field import Field, integer, values_of
-from brakecli.files.valid import LARGEST_SQUARE
+from brakecli.files.field import LARGEST_SQUARE, Field, integer, values_of
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.run import origin
 from brakecli.solver.arrays import Floats

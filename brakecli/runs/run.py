@@ -21,7 +21,6 @@ from brakecli.case.read import LoadedCase, with_duration
 from brakecli.case.system import system_of
 from brakecli.files import fields
 from brakecli.files.field import values_of
-from brakecli.files.trust import readings
 from brakecli.files.write import ResultFile, new_result
 from brakecli.runs.certificate import Certificate
 from brakecli.runs.judge import asked, given, judged_in_memory, motion_of, refuse_overflow
@@ -224,7 +223,7 @@ def _write_events(result: ResultFile, track: Track) -> tuple[str, ...]:
 
 def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
     """The attributes that say where a result comes from: the case and the versions."""
-    case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved, **readings.noted()}
+    case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved}
     return {"kind": kind, "title": title, **case, "brakecli_version": __version__, **versions()}
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.analysis.regime.decision import Excitation, Regime
-from brakecli.files.valid import LARGEST_SQUARE
+from brakecli.files.field import LARGEST_SQUARE
 from brakecli.sweeps.plan import Plan
 
 

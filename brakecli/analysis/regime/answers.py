@@ -125,13 +125,9 @@ class Answers(NamedTuple):
 
     @classmethod
     def of(cls, known: Mapping[str, Any]) -> "Answers":
-        """The record of what is known by name; what else there is does not matter.
-
-        A number may be a list of one, as xarray saves it.
-        """
-        single = {name: value[0] if isinstance(value, list) and value else value for name, value in known.items()}
+        """The record of what is known by name; what else there is does not matter."""
         known_as = cls._field_defaults.items()
-        return cls(**{name: type(value)(single[name]) for name, value in known_as if name in single})
+        return cls(**{name: type(value)(known[name]) for name, value in known_as if name in known})
 
     def powers(self, rate: float) -> float:
         """Powers of e by which something changes in half of the run."""

@@ -8,10 +8,8 @@ import re
 import struct
 import warnings
 from dataclasses import replace
-from functools import partial
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +17,7 @@ from brakecli.analysis.signals.look import Measurand, Signal
 from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.faces import argument
-from brakecli.files.opening import contents, opened
+from brakecli.files.opening import contents
 from brakecli.files.table import LARGEST, TextTable, ordinal, si
 from brakecli.files.table import require as _require
 
@@ -106,7 +104,9 @@ def read_signal(
             remedy = f"leave out {argument('column')}, and give {argument('sample-rate')} HZ"
             raise UsageError(f"a dataset has no columns; {remedy}")
         else:
-            values, written = _dataset(path, name := inside)
+            from brakecli.analysis.signals.foreign import dataset
+
+            values, written = dataset(path, name := inside, _MOST_SAMPLES)
             size = _size(_written(written, unit, quantity), unit, *wanted)
         values = _numbers(values) * size
         signal = _evenly(values, *times) if sample_rate is None else Signal(values, 1.0 / sample_rate)
@@ -203,42 +203,6 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
         return rows[number - 1].astype(np.float64), float(rate)
     middle = 128.0 if values.dtype.kind == "u" else 0.0
     return (rows[number - 1] - middle) / (middle or -float(np.iinfo(values.dtype).min)), float(rate)
-
-
-def _dataset(path: Path, inside: str) -> tuple[Array, str]:
-    """A row of numbers with its attribute `units`; whatever h5py raises on damage is reported."""
-    import h5py
-
-    from brakecli.files.read import try_out
-
-    with opened(path) as stream:
-        row = partial(_row, inside=inside, length=os.fstat(stream.fileno()).st_size)
-        try:
-            try_out(stream, row)
-            with h5py.File(stream, "r") as file:
-                return row(file)
-        except Exception as error:
-            what = f"cannot be read: {' '.join(str(error).split())}"
-            raise UnreadableResultError(f"{what}; name an intact HDF5 file and a dataset in it") from error
-
-
-def _row(file: Any, inside: str, length: int) -> tuple[Array, str]:
-    """A row of numbers in an open HDF5 file of this length (bytes), and its unit; raises ValueError."""
-    from brakecli.files import valid
-
-    if inside.count("/") > valid.DEEPEST:
-        raise ValueError(f"{printable(inside)} lies in groups of more than {valid.DEEPEST} levels")
-    node = valid.member(file, inside)  # links to other files may lead to a pipe
-    if not hasattr(node, "dtype") or not hasattr(node, "shape"):
-        names = [f"/{name}" for name, each in valid.tree(file).items() if hasattr(each, "shape")]
-        raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
-    if not node.shape or sum(size != 1 for size in node.shape) > 1 or node.dtype.kind not in "iuf":
-        raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
-    valid.check_size(node, length, f"dataset {inside}")  # HDF5 crashes on a virtual one of itself
-    if node.size > _MOST_SAMPLES:
-        raise ValueError(f"dataset {inside} has {node.size} samples, and {_MOST_SAMPLES} are the most")
-    units = valid.plain_attribute(node, "units")
-    return np.asarray(node[:], dtype=np.float64).ravel(), units if isinstance(units, str) else ""
 
 
 def _numbers(values: Array) -> Array:
