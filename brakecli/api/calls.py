@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 def called() -> Iterator[None]:
     """Around each call: Ctrl-C ends compiled code, too, but in other threads, which hear no signals.
 
-    Objects of xarray have the accessor from then on. Arrays that are profiles of surfaces are forgotten at the end.
+    Objects of xarray have the accessor from then on. Profiles that are arrays are forgotten at the end.
     """
     import brakecli.accessor  # noqa: F401
     from brakecli.case.roughness import arrays

@@ -39,9 +39,7 @@ def last_of(path: Path) -> End:
         except (CaseError, ValidationError) as error:
             what = f"{path}: holds no case of this version"
             raise UnreadableResultError(f"{what}; run its case again") from error
-        history = result.variables("history")
-        shapes = {history[name].shape if name in history else (0,) for name in ("time", *_STATE)}
-        if len(shapes) != 1 or not (samples := shapes.pop()[0]):
+        if not (samples := result.variables("history")["time"].shape[0]):
             raise UnreadableResultError(f"{path}: has no history; run its case again")
         time, *state = (float(result.read("history", name, samples - 1)[0]) for name in ("time", *_STATE))
     return End(case, time, state)

@@ -62,8 +62,9 @@ def _write(result: ResultFile, node: xr.DataTree, kind: str) -> None:
         if not (isinstance(value, float) and math.isnan(value)):  # a number that does not exist
             result.set_attributes({name: value}, group)
     held = node.to_dataset(inherit=False)
-    axes = {
-        name: node.coords.get(name, xr.DataArray(np.arange(size), dims=name)) for name, size in held.sizes.items()
+    axes: dict[Any, Any] = {
+        name: node.coords.get(name, xr.DataArray(np.arange(size), dims=[name]))
+        for name, size in held.sizes.items()
     }
     for name, each in {**axes, **{name: held[name] for name in held.variables if name not in axes}}.items():
         about = dict(each.attrs)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.errors import CaseError, UnreadableResultError, UsageError, printable
+from brakecli.errors import UsageError, printable
 from brakecli.files.field import Field, flat, integer, named, plain, plain_units, ratio
 from brakecli.files.fields import COMPARISON, OBJECT, RUN, SWEEP, TEXT, WELCH
 from brakecli.files.read import BLOCK, StoredResult, Variable
@@ -139,7 +139,7 @@ class Difference:
 
 
 def difference(a: StoredResult, b: StoredResult) -> Difference:
-    """Compare two results of one kind; raises UsageError for two kinds, and UnreadableResultError."""
+    """Compare two results of one kind; raises UsageError for two kinds, UnreadableResultError."""
     kinds = [str(each.attributes.get("kind")) for each in (a, b)]
     if kinds[0] != kinds[1]:
         what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
@@ -167,22 +167,11 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
 
 
 def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, Any]:
-    """All keys of the case, and of the sweep or the study, with their values; raises UnreadableResultError."""
+    """All keys of the case, and of the sweep or the study, with their values."""
     found: dict[str, Any] = {}
     for name in texts:
-        try:
-            found |= flat(parse(str(result.attributes.get(name, "")), name, number=_finite))
-        except (CaseError, ValueError, RecursionError) as error:
-            what = f"{result.path}: the case in it is not valid: {error}"
-            raise UnreadableResultError(f"{what.partition('; ')[0]}; name an intact file") from error
+        found |= flat(parse(str(result.attributes.get(name, "")), f"{result.path}: {name}"))
     return found
-
-
-def _finite(text: str) -> float:
-    value = float(text)
-    if not math.isfinite(value):
-        raise ValueError(f"{text} is no number")
-    return value
 
 
 def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:

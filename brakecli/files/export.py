@@ -114,8 +114,8 @@ def _rows(result: StoredResult, group: str, names: Sequence[str], wanted: Part) 
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     known = result.variables(group)
     axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(known)
-    if not axes or any(axis not in known for axis in axes):
-        raise UnreadableResultError(f"{result.path}: {group} lacks its axes; name an intact result file")
+    if not axes:
+        raise UnreadableResultError(f"{result.path}: holds no numbers along an axis; name another result")
     shape = tuple(known[axis].shape[0] for axis in axes)
     ordered = sorted(known, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
     there = [name for name in ordered if known[name].dims != (name,) and _lies_along(known[name], axes, shape)]

@@ -3,7 +3,6 @@
 from collections.abc import Iterable
 from typing import Any
 
-from brakecli.errors import UnreadableResultError
 from brakecli.files import fields, stability_fields
 from brakecli.files.field import Field, plain
 from brakecli.files.read import StoredResult
@@ -51,10 +50,6 @@ def rows(result: StoredResult, group: str, known: Iterable[Field]) -> list[dict[
     """The variables of a group, a record for each place along them; None stands for a number that is missing."""
     there = result.variables(group)
     columns = {each.name: result.read(group, each.name) for each in known if each.name in there}
-    if len({len(values) for values in columns.values()}) > 1:
-        raise UnreadableResultError(
-            f"{result.path}: the variables of its group {group} do not fit each other; compute it again"
-        )
     lists = {name: _known(values.tolist()) for name, values in columns.items()}
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 

@@ -170,14 +170,11 @@ class Located:
         self.problems.append(Problem(path, what, "keep one of the two", self._source, line))
 
 
-def parse(text: str, source: str = "", line: int = 1, number: Callable[[str], Any] = float) -> dict[str, Any]:
-    """The data of a text, given or stored, that begins in a line of a file; raises `CaseError`.
-
-    `number` makes something of what is written with a point or an exponent.
-    """
+def parse(text: str, source: str = "", line: int = 1) -> dict[str, Any]:
+    """The data of a text, given or stored, that begins in a line of a file; raises `CaseError`."""
     split(text, source)
     try:
-        return tomllib.loads(text, parse_float=number)
+        return tomllib.loads(text)
     except RecursionError:
         raise unfit(
             "is nested too deep", "case files hold no list or table of more than two levels", source, line

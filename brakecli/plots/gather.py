@@ -92,8 +92,6 @@ def _listed(result: StoredResult) -> tuple[tuple[Axis, style.Array], ...]:
     point = fields.LISTED_POINT.name
     keys = np.ravel(known[point].attributes.get("parameters", ())) if point in known else ()
     for name in (str(key).replace(".", "_") for key in keys):
-        if known[name].dims != (point,):
-            raise style.unreadable(result, f"{name} does not lie along {point}")
         values, places = np.unique(result.read("/", name), return_inverse=True)
         axis = _axis(result, name, values)
         found += [(axis, axis.values[places])] * (len(values) > 1)
@@ -104,10 +102,6 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     """What is drawn of the points, over the directions and the axes as they lie in the file."""
     known = result.variables("/")
     names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
-    if missing := [name for name in names if name not in known]:
-        raise style.unreadable(result, f"it has no variable {missing[0]}")
-    if len({(known[name].dims, known[name].shape) for name in names}) != 1:
-        raise style.unreadable(result, "its variables do not lie on the same axes")
     dims = known["status"].dims
     both = dims[:1] == ("direction",)
 
@@ -124,7 +118,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         raise UsageError(f"{result.path}: {problem}; give one of {', '.join(able)}")
     base = str(result.attributes.get("resolved_toml", ""))
     margin = None
-    with suppress(CaseError, ValueError, RecursionError):  # of older results, and of forged ones
+    with suppress(CaseError, ValueError):  # of older results
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
     if margin is not None and margin.size == np.prod(shape[1:]):
         variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)

@@ -21,15 +21,11 @@ _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the dashe
 
 def draw(result: StoredResult) -> Figure:
     """The figure: frequencies above, growth rates below. Raises UsageError where there is nothing to draw."""
-    place = next((name for name, each in result.variables("/").items() if "parameters" in each.attributes), "")
-    if not place:
-        raise style.unreadable(result, "the axis of the key is missing")
+    place = result.variables("/")["frequencies"].dims[0]
     attributes = result.variables("/")[place].attributes
     key = str(attributes.get("long_name", ""))
     units = style.unit_of(attributes)
     x, *modes = (style.read_column(result, name) for name in (place, "frequencies", "growth_rates"))
-    if not np.isfinite(x).all() or any(values.shape != (len(x), 2) for values in modes):
-        raise style.unreadable(result, "its variables do not fit the axis of the key")
     if not np.isfinite(modes[0]).any():
         raise UsageError(f"{result.path}: there is no steady sliding at any value, so there is nothing to draw")
     critical = np.asarray(result.attributes.get("critical_values", ()), float).ravel()

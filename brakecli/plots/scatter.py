@@ -24,16 +24,12 @@ _OTHERS = style.BLUE
 def draw(result: StoredResult) -> Figure:
     """The figure: bars above, histograms below. Raises UnreadableResultError."""
     known = result.variables("/")
-    if not {"outcome", "probability", "probability_lower", "probability_upper"} <= known.keys():
-        raise style.unreadable(result, "its probabilities are missing")
     shares = [
         style.read_column(result, name) for name in ("probability", "probability_lower", "probability_upper")
     ]
     outcomes = [*map(str, result.read("/", "outcome"))]
     indexed = "total" in known and "parameter" in known
     columns = _columns(result)
-    if not len(outcomes) or any(each.shape != (len(outcomes),) for each in shares):
-        raise style.unreadable(result, "its probabilities do not fit its outcomes")
     attributes = result.attributes
     rows = max(len(outcomes), 3)
     lines = (str(attributes.get(name, "")) for name in ("title", "sentence"))
@@ -63,8 +59,6 @@ def _columns(result: StoredResult) -> dict[str, tuple[style.Array, str]]:
         if name in known and len(found) < 2:
             values = style.read_column(result, name)
             only = name in ("frequency", "amplitude") and squeals.any()
-            if only and values.shape != squeals.shape:
-                raise style.unreadable(result, "its samples do not fit each other")
             values = values[squeals] if only else values
             if np.isfinite(values).any():
                 found[name] = values[np.isfinite(values)], "samples that squeal" if only else "samples"
@@ -97,8 +91,6 @@ def _tornado(axes: Axes, result: StoredResult, of: str) -> None:
     """Total indices, the largest on top, and within them the first-order ones."""
     names = np.array([*map(str, result.read("/", "parameter"))])
     first, total, error = (style.read_column(result, name) for name in ("first_order", "total", "total_error"))
-    if not len(names) == len(first) == len(total) == len(error):
-        raise style.unreadable(result, "its indices do not fit its parameters")
     order = np.argsort(total)
     places = np.arange(len(names))
     axes.barh(

@@ -20,13 +20,11 @@ class Stop:
     """What the windows of a run show, in SI units."""
 
     def __init__(self, result: StoredResult, system: System) -> None:
-        """Read it; raises UnreadableResultError where its parts do not fit."""
+        """Read it; raises UnreadableResultError."""
         self.time, self.lines = (result.read("spectrogram", name) for name in ("time", "frequency"))
         self.density = result.read("spectrogram", "vx")
         names = ("speed", "load_force", "amplitude", "stick_fraction")
         self.speed, self.load, self.amplitude, self.stick = (result.read("over_time", name) for name in names)
-        if self.density.shape != (len(self.time), len(self.lines)) or self.speed.shape != self.time.shape:
-            raise style.unreadable(result, "its spectrogram does not fit its axes")
         starts, ends = (result.read("vibrations", name) for name in ("start", "end"))
         self.vibrations = [*zip(starts, ends - starts, strict=True)]
         self.waves = sorted(system.wheel.turns)[:MOST_LINES]  # 1/m, the longest

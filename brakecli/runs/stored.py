@@ -85,8 +85,7 @@ def stored_run(path: Path) -> Iterator[Stored]:
             system = system_of(parse_case(result.text("resolved_toml"), str(path)).case)
         except (CaseError, KeyError) as error:
             raise UnreadableResultError(f"{path}: holds no case of this version; run its case again") from error
-        time = result.variables("history").get("time")
-        if time is None or time.shape[0] < 1:
+        if not (samples := result.variables("history")["time"].shape[0]):
             raise UnreadableResultError(f"{path}: has no history; run its case again")
-        history = History(system.interval, time.shape[0], partial(result.read, "history"))
+        history = History(system.interval, samples, partial(result.read, "history"))
         yield Stored(system, history, result.attributes, result.group_attributes("regime/evidence"))
