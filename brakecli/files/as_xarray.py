@@ -55,28 +55,26 @@ def _write(result: ResultFile, node: xr.DataTree, kind: str) -> None:
     for name, value in node.attrs.items():
         if isinstance(value, np.ndarray) and value.dtype.kind not in "iuf":
             value = value.tolist()
-        if (
-            name in known and known[name].is_list and np.ndim(value) == 0
-        ):  # xarray takes a list of one for its item
+        if name in known and known[name].is_list and np.ndim(value) == 0:  # as xarray reads a list of one
             value = np.array([value]) if known[name].units else [value]
         if not (isinstance(value, float) and math.isnan(value)):  # a number that does not exist
-            result.set_attributes({name: value}, group)
+            result.set_attributes({str(name): value}, group)
     held = node.to_dataset(inherit=False)
-    axes: dict[Any, Any] = {
-        name: node.coords.get(name, xr.DataArray(np.arange(size), dims=[name]))
-        for name, size in held.sizes.items()
-    }
-    for name, each in {**axes, **{name: held[name] for name in held.variables if name not in axes}}.items():
+    numbers = {axis: np.arange(size) for axis, size in held.sizes.items() if axis not in held.coords}
+    held = held.assign_coords({axis: node.coords.get(axis, each) for axis, each in numbers.items()})
+    for name in sorted(held.variables, key=lambda name: name not in held.sizes):  # axes come first
+        each = held.variables[name]
+        dims = [str(axis) for axis in each.dims]
         about = dict(each.attrs)
         values = each.values
         if values.dtype.kind in "OT" and all(isinstance(text, str) for text in values.flat):
             values = values.astype(np.str_)
         form = {"f": "f8", "U": "S"}.get(values.dtype.kind, values.dtype.str)
         field = Field(str(name), about.pop("units", ""), about.pop("long_name", str(name)), form)
-        if name in axes or group in _WITHOUT_GAPS:
-            result.variable(group, field, each.dims, values, **about)
+        if name in held.sizes or group in _WITHOUT_GAPS:
+            result.variable(group, field, dims, values, **about)
         else:
-            result.column(field, each.dims, values, group, **about)
+            result.column(field, dims, values, group, **about)
 
 
 @contextmanager

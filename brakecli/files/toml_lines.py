@@ -6,7 +6,7 @@ into its statements, and each of them is parsed by itself.
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any, TypeVar
 

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 from scipy.io import wavfile
 
+from brakecli.analysis.signals import foreign
 from brakecli.analysis.signals import read as signal_file
 from brakecli.analysis.signals.look import Measurand, Signal, look
 from brakecli.analysis.signals.read import read_signal
 from brakecli.errors import UnreadableResultError, UsageError
+from tests.campaign import campaign
 
 
 def read(
@@ -327,6 +329,42 @@ def test_times_in_a_wrong_unit_are_refused(tmp_path: Path, step: str) -> None:
 def test_very_large_values_are_refused_without_a_warning_of_numpy(tmp_path: Path) -> None:
     with pytest.raises(UnreadableResultError, match="beyond 1e100"):
         read(written(tmp_path, "1e308\n-1e308\n1e308\n"), rate=10.0)
+
+
+def test_a_view_of_itself_and_a_link_are_no_signals(tmp_path: Path) -> None:
+    """HDF5 crashes on a virtual dataset without a fixed length as soon as its shape is asked for."""
+    with h5py.File(tmp_path / "s.h5", "w") as file:
+        file["v"] = [1.0, 2.0]
+        grows = h5py.h5s.create_simple((5,), (h5py.h5s.UNLIMITED,))
+        grows.select_hyperslab((0,), (1,), block=(h5py.h5s.UNLIMITED,))
+        plist = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        plist.set_virtual(grows, b".", b"own", grows)
+        h5py.h5d.create(file.id, b"own", h5py.h5t.NATIVE_DOUBLE, grows, plist)
+        file["link"] = h5py.ExternalLink("/dev/zero", "/")
+        file["soft"] = h5py.SoftLink("/v")
+        file.create_group("loop")["up"] = file["/"]
+    for name in ("own", "link", "soft", "loop"):
+        with pytest.raises(UnreadableResultError, match=f"there is no dataset /{name}, only /v;"):
+            read(f"{tmp_path}/s.h5:/{name}", rate=10.0)
+
+
+@campaign
+def test_a_file_on_which_hdf5_never_ends_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In a heap of texts, free space that claims no length makes HDF5 read the same place again and again."""
+    path = tmp_path / "s.h5"
+    with h5py.File(path, "w") as file:
+        file["v"] = [1.0, 2.0]
+        file["v"].attrs["units"] = np.array("m/s", h5py.string_dtype())
+    data = bytearray(path.read_bytes())
+    place = data.index(b"GCOL") + 16
+    while number := int.from_bytes(data[place : place + 2], "little"):
+        assert 0 < number < 1000
+        place += 16 + (int.from_bytes(data[place + 8 : place + 16], "little") + 7) // 8 * 8
+    data[place + 8 : place + 16] = bytes(8)
+    path.write_bytes(data)
+    monkeypatch.setattr(foreign, "SHORTEST_TRIAL", 1.0)
+    with pytest.raises(UnreadableResultError, match="HDF5 cannot read it"):
+        read(f"{path}:/v", rate=10.0)
 
 
 def test_what_is_wrong_with_a_dataset_is_said_in_words(tmp_path: Path) -> None:

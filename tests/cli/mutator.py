@@ -1,4 +1,4 @@
-"""Case and sweep files with mistakes, and result files whose headers were changed, with checksums that fit."""
+"""Case and sweep files with mistakes, and HDF5 files whose headers were changed, with checksums that fit."""
 
 import random
 import re

@@ -1,4 +1,4 @@
-"""Whatever a command is given as a file: what is wrong with it is said at once, and marks what is made of it."""
+"""Whatever a command is given as a file: what is wrong with it is said at once."""
 
 import bz2
 import gzip
@@ -17,23 +17,12 @@ from brakecli.errors import UsageError
 from brakecli.sweeps import driver
 from tests.campaign import campaign
 from tests.commands import TINY, brakecli, each, ended, forked, lazily, run, started
+from tests.files.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
 SWEEP = 'case = "{}"\n[[axis]]\nparameter = "load.force"\nvalues = [1000.0, 2000.0]\n'
 NO_FILE = "this is not a regular file"
-
-
-def damaged(good: Path, here: Path) -> Path:
-    """The good result with a digest that does not fit."""
-    (here / "bad.h5").write_bytes((good / "tiny.h5").read_bytes()[:-1] + b"\0")
-    return here / "bad.h5"
-
-
-def without_digest(good: Path, here: Path) -> Path:
-    """The good result as other programs save it."""
-    (here / "other.h5").write_bytes((good / "tiny.h5").read_bytes()[:-32])
-    return here / "other.h5"
 
 
 @pytest.mark.parametrize("kind", ["pipe", "folder", "device", "socket"])
@@ -70,47 +59,22 @@ def test_no_command_waits_for_what_is_no_file(here: Path, kind: str) -> None:
         assert NO_FILE in done.err or (kind in ("folder", "socket") and "x" in done.err), done
 
 
-def test_a_result_whose_digest_does_not_fit_needs_force_and_a_table_of_it_is_marked(
-    good: Path, here: Path
-) -> None:
-    name = damaged(good, here).name
-    brakecli("export", name, "-o", "b.csv", cwd=here).told(4, "only --force-read looks at it")
-    assert not (here / "b.csv").exists()
-    brakecli("export", name, "--force-read", "-o", "b.csv", cwd=here).told(0, "bad.h5: its digest does not fit")
-    assert (here / "b.csv").read_text().startswith("# read by force: a digest does not fit\ntime (s),")
-
-
 @campaign
-def test_a_result_whose_digest_does_not_fit_is_looked_at_by_force_and_all_of_it_is_marked(
-    good: Path, here: Path
-) -> None:
-    name = damaged(good, here).name
-    for command in ("info", "plot", "report", "export", "classify"):
-        brakecli(command, name, cwd=here).told(4, "only --force-read looks at it")
-    assert not [path for path in here.iterdir() if path.suffix in (".png", ".html", ".csv")]
-    said = "bad.h5: its digest does not fit"
-    for command in ("info", "classify"):
-        done = brakecli(command, name, "--force-read", "--json", cwd=here)
-        done.told(0, said)
-        assert done.json["digest"] == "does not fit"
-    made = (["plot", "-o", "b.svg"], ["report", "-o", "b.html"], ["export", "-o", "b.csv"])
-    for command, *words in made:
-        brakecli(command, name, "--force-read", *words, cwd=here).told(0, said)
-        assert "read by force" in (here / words[1]).read_text(), command
-    brakecli("export", name, "--force-read", "-o", "b.wav", cwd=here).told(
-        2, "cannot say that it was read by force"
-    )
-    brakecli("run", name, "--force-read", "-q", "-o", "again.h5", cwd=here).told(0, said)
-    with h5py.File(here / "again.h5") as file:
-        assert file.attrs["digest"] == "does not fit"
-
-
-def test_a_result_without_a_digest_is_read_and_said_to_be_unchecked(good: Path, here: Path) -> None:
-    name = without_digest(good, here).name
-    done = brakecli("info", name, "--json", cwd=here)
-    done.told(0, "other.h5: has no digest")
-    assert done.json["digest"] == "missing"
-    brakecli("plot", name, cwd=here).told(0, "unchecked")
+def test_no_command_reads_a_result_without_a_digest_that_fits(good: Path, here: Path) -> None:
+    whole = (good / "tiny.h5").read_bytes()
+    (here / "bad.h5").write_bytes(whole[:-1] + b"\0")
+    (here / "other.h5").write_bytes(whole[:-32])
+    remedies = {
+        "bad.h5": "its digest does not fit, so that it is damaged or was altered; name an intact result file",
+        "other.h5": "has no digest, as another program has saved it; keep a Dataset by result.brakecli.save(path)",
+    }
+    commands = ["info"], ["check"], ["plot"], ["report"], ["export"], ["classify"], ["diff", str(good / "tiny.h5")]
+    for name, remedy in remedies.items():
+        for command, *more in (*commands, ["run", "-o", "again.h5"], ["stability"], ["advise"]):
+            told = brakecli(command, name, *more, cwd=here).told(4, name, f"{remedy}, or compute it again")
+            assert told.count("\n") == 1
+    assert {path.name for path in here.iterdir()} == {"tiny.toml", "bad.h5", "other.h5"}
+    brakecli("info", "bad.h5", "--force-read", cwd=here).told(2, "--force-read")
 
 
 @campaign
@@ -130,9 +94,10 @@ def test_no_variable_of_a_library_changes_a_picture_or_ends_it(good: Path, here:
 
 
 def test_no_cell_of_a_table_is_a_formula_and_none_holds_control_characters(good: Path, here: Path) -> None:
-    path = without_digest(good, here)
+    path = here / "r.h5"
+    path.write_bytes((good / "tiny.h5").read_bytes())
     texts = ["=1+1", "+1", "-x", "@x", "\x1b[31m", " =2", "plain", "-1.5"]
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         file.create_dataset("history/=note", data=np.resize(np.array(texts, dtype="S8"), file["history/x"].shape))
         file["history/=note"].dims[0].attach_scale(file["history/time"])
     done = brakecli("export", path.name, "--variable", "=note", "-o", "t.csv", cwd=here)
@@ -144,14 +109,10 @@ def test_no_cell_of_a_table_is_a_formula_and_none_holds_control_characters(good:
 
 
 @campaign
-def test_limits_hold_where_the_work_is_done(good: Path, here: Path) -> None:
+def test_limits_hold_where_the_work_is_done(here: Path) -> None:
     brakecli("advise", "tiny.toml", "--set", "output.sample_interval=1e20", cwd=here).told(
         3, "the run is too long"
     )
-    path = without_digest(good, here)
-    with h5py.File(path, "r+") as file:
-        file.attrs["resolved_toml"] = file.attrs["case_toml"] = "a.b.c.d = [1]\n" * 120_000
-    brakecli("diff", path.name, good / "tiny.h5", cwd=here).told(4, "is larger than 1250000 bytes")
 
 
 @campaign

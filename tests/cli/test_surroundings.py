@@ -6,11 +6,11 @@ import unicodedata
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-import h5py
 import pytest
 
 from tests.campaign import campaign
 from tests.commands import TINY, Done, brakecli, each, lazily, shell
+from tests.files.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -103,8 +103,8 @@ def odd_in(text: str) -> set[str]:
 def test_no_control_character_of_a_file_a_name_or_a_title_reaches_the_terminal(good: Path, tmp_path: Path) -> None:
     (tmp_path / f"{ODD}.toml").write_text(TINY)
     (tmp_path / f"{ODD}.csv").write_text(f"{ODD},y\n0,1\n1,2\n")
-    (tmp_path / f"{ODD}.h5").write_bytes((good / "tiny.h5").read_bytes()[:-32])
-    with h5py.File(tmp_path / f"{ODD}.h5", "r+") as file:
+    (tmp_path / f"{ODD}.h5").write_bytes((good / "tiny.h5").read_bytes())
+    with edited(tmp_path / f"{ODD}.h5") as file:
         text = file.attrs["resolved_toml"].replace('title = "Tiny"', r'title = "\u202Ex"')
         file.attrs["resolved_toml"] = text
         file.attrs["failure"] = ODD

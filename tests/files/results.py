@@ -2,14 +2,16 @@
 
 import subprocess
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 
 from brakecli.files.field import Field
-from brakecli.files.read import open_result
+from brakecli.files.read import digest, open_result
 from brakecli.files.write import ResultFile, new_result
 from tests.commands import LIMIT, ROOT
 
@@ -41,6 +43,15 @@ def read_all(path: Path) -> dict[str, Any]:
             for name, variable in result.variables(group).items():
                 everything[f"{group}/{name}"] = str(variable), result.read(group, name).tobytes()
         return everything
+
+
+@contextmanager
+def edited(path: Path) -> Iterator[h5py.File]:
+    """A result that may be changed within the block, and has a digest that fits again behind it."""
+    with h5py.File(path, "r+") as file:  # which cuts the digest off
+        yield file
+    with path.open("r+b", buffering=0) as stream:
+        stream.write(digest(stream, path.stat().st_size))
 
 
 Action = Callable[[Path], None]

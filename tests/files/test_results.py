@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from brakecli.errors import UnreadableResultError, UsageError
+from brakecli.errors import UsageError
 from brakecli.files.field import Field
 from brakecli.files.opening import is_hdf5
 from brakecli.files.read import open_result
@@ -270,20 +270,6 @@ def test_hdf5_is_known_by_its_signature_alone(tmp_path: Path) -> None:
     assert is_hdf5(tmp_path / "block.mat")
     for other in ("text.h5", "empty.h5", "missing.h5", ".", "x" * 300, "nul\0"):
         assert not is_hdf5(tmp_path / other)
-
-
-def test_a_file_edited_elsewhere_is_read_for_what_it_says_now(tmp_path: Path) -> None:
-    write(tmp_path / "r.h5")
-    with h5py.File(tmp_path / "r.h5", "r+") as file:
-        file.attrs["note"] = "added by hand"
-    with open_result(tmp_path / "r.h5", "run") as result:
-        assert result.attributes["note"] == "added by hand"
-        assert result.read("history", "time").size == 100
-    with (
-        pytest.raises(UnreadableResultError, match="kind 'run', and 'sweep'"),
-        open_result(tmp_path / "r.h5", "sweep"),
-    ):
-        raise AssertionError
 
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from brakecli.case.read import parse_case, read_text
-from brakecli.errors import UnreadableResultError
 from brakecli.files.read import open_result
 from brakecli.plots import style
 from brakecli.plots.run import RunPicture, draw
@@ -45,14 +44,3 @@ def test_the_spectrogram_has_the_waves_both_modes_and_the_vibration(stop: Path) 
     assert where[::-1] == np.unravel_index(np.argmax(density), density.shape)
     curve = figure.axes[5].get_lines()[0]
     np.testing.assert_allclose(np.asarray(curve.get_ydata(), float), 1e6 * amplitude)
-
-
-def test_a_spectrogram_that_does_not_fit_is_refused(stop: Path, tmp_path: Path) -> None:
-    data = bytearray(stop.read_bytes()[:-32])  # without its digest
-    (tmp_path / "s.h5").write_bytes(data)
-    with h5py.File(tmp_path / "s.h5", "r+") as file:
-        times = file["spectrogram/time"][:]
-        del file["spectrogram/frequency"]
-        file["spectrogram"].create_dataset("frequency", data=times, chunks=times.shape, fletcher32=True)
-    with open_result(tmp_path / "s.h5") as stored, pytest.raises(UnreadableResultError, match="does not fit"):
-        RunPicture(stored)

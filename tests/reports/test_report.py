@@ -22,9 +22,7 @@ from brakecli.analysis.stability.advice import KEYS
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.errors import BrakecliError, UnreadableResultError, UsageError
-from brakecli.files.field import Field
-from brakecli.files.numbers import rows as records
+from brakecli.errors import BrakecliError, UsageError
 from brakecli.files.read import open_result
 from brakecli.files.write import new_result
 from brakecli.plots import style
@@ -425,16 +423,6 @@ def test_branches_have_a_sentence_a_picture_and_their_special_points(
     assert flutter[0][3] == "-"  # no motion has an amplitude there
     text = " ".join(page.texts)
     assert text.index("Branch 0: steady sliding") < text.index("Branch 1: limit cycle")
-
-
-def test_a_table_whose_columns_do_not_fit_each_other_is_refused(tmp_path: Path) -> None:
-    with new_result(tmp_path / "r.h5", force=False) as result:
-        known = [Field(name, "1", name) for name in ("parameter", "total")]
-        for each, size in zip(known, (2, 3), strict=True):
-            result.variable("/", each, (each.name,), np.ones(size))
-        result.commit()
-    with open_result(tmp_path / "r.h5") as stored, pytest.raises(UnreadableResultError, match="do not fit"):
-        records(stored, "/", known)
 
 
 def test_scatter_has_its_study_and_its_probabilities_as_tables(

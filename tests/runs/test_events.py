@@ -5,7 +5,6 @@ import math
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 import tomli_w
@@ -14,7 +13,7 @@ from numpy.typing import NDArray
 
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.errors import CaseError, UnreadableResultError, UsageError
+from brakecli.errors import CaseError, UsageError
 from brakecli.files.contents import contents, difference
 from brakecli.files.export import export
 from brakecli.files.read import open_result
@@ -158,17 +157,6 @@ def test_info_diff_and_export_know_the_group(tmp_path: Path) -> None:
     assert header == ["event", "time (s)", "kind", "x (m)", "y (m)", "vx (m/s)", "vy (m/s)"]
     assert [float(row[1]) for row in rows] == found.time.values.tolist()
     assert [row[2] for row in rows] == found.kind.values.tolist()
-
-
-def test_a_group_of_other_lengths_or_kinds_is_refused(tmp_path: Path) -> None:
-    for number, (name, values) in enumerate({"x": np.zeros(3), "kind": np.zeros(3), "time": np.zeros(3)}.items()):
-        path = tmp_path / f"{number}.h5"
-        written(path, STICKS, "solver.duration=0.02")
-        with h5py.File(path, "r+") as file:
-            del file["events"][name]
-            file["events"][name] = values
-        with pytest.raises(UnreadableResultError, match=f"variable {name} in group events"), open_result(path):
-            pass
 
 
 def test_a_start_beside_steady_sliding_is_said() -> None:

@@ -3,7 +3,6 @@
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 import pytest
 import tomli_w
@@ -19,6 +18,7 @@ from brakecli.runs.run import run
 from brakecli.sweeps.plan import parse_sweep
 from tests.campaign import campaign
 from tests.examples import ROUGH, SQUEAL
+from tests.files.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
 MOTION = ("x", "y", "vx", "vy", "normal_force")
@@ -132,13 +132,13 @@ def test_an_override_by_a_result_replaces_a_start_that_is_given(tmp_path: Path) 
 def test_a_motion_that_has_died_out_begins_at_rest(tmp_path: Path) -> None:
     """A case takes no number below 1e-100 but 0."""
     motion(tmp_path / "a.h5", ROUGH)
-    with h5py.File(tmp_path / "a.h5", "r+") as file:
+    with edited(tmp_path / "a.h5") as file:
         file["history/vx"][-1] = -1e-200
     assert end_of(tmp_path / "a.h5")["vx"] == 0.0
 
 
 def altered(path: Path, name: str, value: str) -> None:
-    with h5py.File(path, "r+") as file:
+    with edited(path) as file:
         file.attrs[name] = value
 
 
@@ -157,7 +157,7 @@ def test_what_is_no_end_of_a_run_is_refused_with_one_sentence(tmp_path: Path) ->
     assert "initial.vx: is given together with from (found 1.0); keep one of the two" in problem("initial.vx=1.0")
     part = tmp_path / "part.h5"
     part.write_bytes(whole.read_bytes()[:-100])
-    assert "truncated, damaged or was altered" in problem(path=part)
+    assert "its digest does not fit, so that it is damaged or was altered" in problem(path=part)
     part.write_text("no result")
     assert "this is not an HDF5 file" in problem(path=part)
 
@@ -171,7 +171,7 @@ def test_what_is_no_end_of_a_run_is_refused_with_one_sentence(tmp_path: Path) ->
     assert start() == f"{whole}: has failed, and its last state is of no use; name a run that is done"
     altered(whole, "status", "done")
     before = whole.read_bytes()
-    with h5py.File(whole, "r+") as file:
+    with edited(whole) as file:
         for name in file["history"]:
             file["history"][name].resize(0, axis=0)
     assert "initial.from: has no history (found " in problem()

@@ -3,10 +3,7 @@
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from brakecli.cli.app import app
-from brakecli.files.read import open_result
 from brakecli.sweeps.workers.task import compute_units
 from tests.campaign import campaign
 from tests.commands import brakecli, left_in
@@ -65,20 +62,3 @@ def test_a_critical_value_by_simulation_does_not_depend_on_the_workers(tmp_path:
     inline(loaded, tmp_path / "one.h5", compute_units)
     local(loaded, tmp_path / "two.h5", compute_units, task_size=1)
     assert (tmp_path / "one.h5").read_bytes() == (tmp_path / "two.h5").read_bytes()
-
-
-@pytest.mark.parametrize(
-    "command", [[], ["check", "tiny.toml"], ["info", "other.h5"]], ids=["none", "check", "info"]
-)
-def test_a_file_that_was_read_before_marks_no_later_result(tmp_path: Path, command: list[str]) -> None:
-    """Neither one that a command of the same process has read, nor one that no command reads."""
-    loaded = write_sweep(tmp_path, frictions(4))
-    inline(loaded, tmp_path / "before.h5")
-    (tmp_path / "other.h5").write_bytes((tmp_path / "before.h5").read_bytes()[:-32])
-    if command:
-        here = [str(tmp_path / word) if (tmp_path / word).exists() else word for word in command]
-        assert CliRunner().invoke(app, here, catch_exceptions=False).exit_code == 0
-    with open_result(tmp_path / "other.h5") as other:
-        assert not other.sealed
-    inline(loaded, tmp_path / "after.h5")
-    assert (tmp_path / "after.h5").read_bytes() == (tmp_path / "before.h5").read_bytes()
