@@ -10,6 +10,7 @@ from brakecli.api.calls import as_files, called, target, telling_to, warn
 from brakecli.api.given import axis_of, case_of, ends_of, mapping, margin_of, patterns_of, pushes_of, study_of
 from brakecli.branches.pushes import PUSHES
 from brakecli.errors import BrakecliError, UsageError
+from brakecli.front.asked import advice_on, stability_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -91,21 +92,10 @@ def stability(
     with called(), telling_to(progress) as tell:
         loaded = case_of(case, settings)
         from brakecli.files.as_xarray import dataset, opened
-        from brakecli.files.field import values_of
         from brakecli.files.stability_fields import STABILITY, THRESHOLDS
 
         if vary is None:
-            from brakecli.analysis.stability.report import stability
-            from brakecli.branches.thresholds import thresholds
-            from brakecli.case.system import system_of
-            from brakecli.runs.limits import within_range
-
-            with within_range():
-                system = system_of(loaded.case)
-                report = stability(system)
-                both = thresholds(loaded.case, system, report, tell, pushes_of(pushes))
-            numbers = values_of(STABILITY, report) | values_of(THRESHOLDS, both)
-            return dataset((*STABILITY, *THRESHOLDS), numbers)
+            return dataset((*STABILITY, *THRESHOLDS), stability_of(loaded, tell, pushes_of(pushes)))
         from brakecli.sweeps.lock_in import lock_in, write
 
         with target(None) as path:
@@ -208,24 +198,11 @@ def advise(
     with called(), telling_to(progress) as tell:
         loaded = case_of(case, settings)
         from brakecli.accessor import Advice
-        from brakecli.analysis.stability.advice import KEYS
-        from brakecli.runs.advise import advise
-        from brakecli.runs.limits import within_range
-        from brakecli.runs.run import load_kernels
+        from brakecli.scattering.scatter import engine_for
 
-        patterns = KEYS if keys is None else patterns_of(keys)
+        patterns = None if keys is None else patterns_of(keys)
         margin = margin_of(margin)
         study = replace(study_of(scatter), base=loaded) if scatter is not None else None
-        load_kernels(loaded)
-        with within_range():
-            report = advise(loaded, patterns, margin, tell)
-            from brakecli.scattering.advised import under_scatter, under_tolerance
-
-            if study is None:
-                report = under_tolerance(report, loaded.case)
-            else:
-                from brakecli.scattering.scatter import engine_for
-
-                report = under_scatter(report, loaded, study, partial(engine_for, in_caller=True), tell)
-                warn(study.beside(loaded.case))
+        report = advice_on(loaded, patterns, margin, study, partial(engine_for, in_caller=True), tell)
+        warn(study.beside(loaded.case) if study else ())
         return Advice(**vars(report))

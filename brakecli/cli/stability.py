@@ -19,6 +19,7 @@ from brakecli.cli.options import (
 from brakecli.cli.output import show_result
 from brakecli.errors import UsageError, printable
 from brakecli.files.atomic import check_target
+from brakecli.front.asked import stability_of
 from brakecli.front.inputs import load_case, result_path
 from brakecli.front.progress import telling
 
@@ -50,36 +51,25 @@ def command(
     target = result_path(output, case, ending=".csv") if output is not None else None
     if target is not None:
         check_target(target, "what --vary finds", (".h5", ".csv"))
-    from brakecli.analysis.stability.report import stability
-    from brakecli.branches.thresholds import thresholds
-    from brakecli.case.system import system_of
-    from brakecli.files.field import values_of
-    from brakecli.files.stability_fields import LOCK_IN, STABILITY, THRESHOLDS
-    from brakecli.runs.limits import within_range
     from brakecli.sweeps.result import unit
     from brakecli.views.stability import of_stability
 
-    with telling(quiet) as show_progress, within_range():
-        system = system_of(loaded.case)
-        report = stability(system)
-        found = None
-        both = None
-        if not axis:
-            both = thresholds(loaded.case, system, report, show_progress, pushes)
-        else:
+    with telling(quiet) as show_progress:
+        numbers = stability_of(loaded, show_progress, None if axis else pushes)
+        if axis:
             from brakecli.files.atomic import new_output
+            from brakecli.files.field import values_of
+            from brakecli.files.stability_fields import LOCK_IN
+            from brakecli.runs.limits import within_range
             from brakecli.sweeps.lock_in import lock_in, write
 
             with new_output(target, force=force) if target else nullcontext():  # whether it can be written
                 pass
-            found = lock_in(loaded, axis, f"--vary {printable(str(vary))}", show_progress)
+            with within_range():
+                found = lock_in(loaded, axis, f"--vary {printable(str(vary))}", show_progress)
             if target:
                 write(target, loaded, found, force=force)
-    numbers = values_of(STABILITY, report)
-    if both:
-        numbers |= values_of(THRESHOLDS, both)
-    if found:
-        numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
+            numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
     units = unit(axis.parameter[0]) if axis else ""
 
     def view(show: "Renderer") -> "View":
