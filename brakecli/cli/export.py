@@ -7,6 +7,7 @@ from typing import Annotated
 from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
 from brakecli.cli.output import show, warn
 from brakecli.front.inputs import result_path
+from brakecli.front.progress import telling
 
 GROUP = "Of a run: history (default), spectrum, over_time, spectrogram, vibrations."
 VARIABLE = "Variable to export, of a table repeatable; all of them, or vx for sound, if left out."
@@ -28,9 +29,9 @@ def command(
     from brakecli.files.read import open_result
 
     target = result_path(output, str(result), ending=".csv")
-    with open_result(result) as stored:
+    with telling(quiet) as tell, open_result(result) as stored:
         part = Part(-math.inf if start is None else start, math.inf if end is None else end, every)
-        notes = export(stored, target, group, variables or (), part, force=force)
+        notes = export(stored, target, group, variables or (), part, force=force, tell=tell)
     warn(*notes)
     if not quiet:
         show(f"{target}: written")

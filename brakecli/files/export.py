@@ -3,7 +3,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -62,7 +62,14 @@ WHOLE = Part()
 
 
 def export(
-    result: StoredResult, target: Path, group: str | None, names: Sequence[str], part: Part = WHOLE, *, force: bool
+    result: StoredResult,
+    target: Path,
+    group: str | None,
+    names: Sequence[str],
+    part: Part = WHOLE,
+    *,
+    force: bool,
+    tell: Callable[[str, int, int], None] = lambda what, done, total: None,
 ) -> list[str]:
     """Write numbers of a result as CSV, or one variable of a run as WAV; sentences on what was left out.
 
@@ -102,7 +109,7 @@ def export(
             sound, notes = _sound(result, names[0] if names else "vx", part)
             file.write(sound)
         else:
-            for rows in _rows(result, group, names, part):
+            for rows in _rows(result, group, names, part, tell):
                 stream = io.StringIO()
                 csv.writer(stream, lineterminator="\n").writerows(rows)
                 file.write(stream.getvalue().encode())
@@ -110,7 +117,9 @@ def export(
     return notes
 
 
-def _rows(result: StoredResult, group: str, names: Sequence[str], wanted: Part) -> Iterator[list[Sequence[Any]]]:
+def _rows(
+    result: StoredResult, group: str, names: Sequence[str], wanted: Part, tell: Callable[[str, int, int], None]
+) -> Iterator[list[Sequence[Any]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     known = result.variables(group)
     axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(known)
@@ -140,6 +149,7 @@ def _rows(result: StoredResult, group: str, names: Sequence[str], wanted: Part) 
                 values = result.read(group, name, start, stop)[::every]
             columns += [*values.reshape(len(columns[0]), -1).T[kept]]
         yield [*zip(*map(_cells, columns), strict=True)]
+        tell("rows", stop - first, last - first)
 
 
 def _ends(time: NDArray[Any], wanted: Part) -> tuple[int, int]:
