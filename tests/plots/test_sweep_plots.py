@@ -145,7 +145,7 @@ def test_a_result_without_what_is_drawn_is_unreadable(tmp_path: Path) -> None:
             {"kind": "sweep", "resolved_sweep_toml": tomli_w.dumps({"case": "c", "axis": [ANGLE]})}
         )
         empty.commit()
-    with pytest.raises(UnreadableResultError, match="no variable status"):
+    with pytest.raises(UnreadableResultError, match="status is missing"):
         gathered(tmp_path / "b.h5")
 
 
