@@ -293,6 +293,15 @@ def test_warnings_are_those_of_the_command(tmp_path: Path) -> None:
         pytest.warns(UserWarning, match="stick and slip are not resolved"),
     ):
         brakecli.run(CASE, steep)
+    heavy = {"shoe.mass": 1000.0, "solver.duration": 0.001}
+    for asked in (
+        lambda: brakecli.stability(CASE, heavy, pushes=0),
+        lambda: brakecli.advise(CASE, heavy, keys="shoe.mass"),
+        lambda: brakecli.branch(CASE, heavy, parameter={"friction.coefficient": (0.1, 0.2)}, pushes=0),
+        lambda: brakecli.sweep(CASE, heavy, axes={"friction.coefficient": [0.1, 0.2]}, jobs=1),
+    ):
+        with pytest.warns(UserWarning, match="were grams meant"):
+            asked()
 
 
 def test_other_threads_compute_as_well() -> None:
@@ -399,7 +408,7 @@ def test_objects_of_a_result_are_records() -> None:
     assert [(each.friction, each.lost) for each in shown.crossings] == [(float(found.critical_friction), True)]
     assert shown.equilibrium.stiffness == float(found.contact_stiffness)
     assert shown.discrete.step_limit is None
-    standing = brakecli.stability(CASE, {"load.force": -1.0}).brakecli
+    standing = brakecli.stability(CASE, {"load.force": -100.0}).brakecli
     assert (standing.equilibrium, standing.discrete) == (None, None)
     assert shown.reasons == ()
 

@@ -1,12 +1,14 @@
 """A starter for a brake of one's own: a similar shoe with its mass, frequency, load and speed.
 
 Shoes are similar where all that has no unit agrees. In units of the mass m, of 1/ω with the angular frequency ω of
-the mode that vibrates, and of the load Q, a length is Q/(m ω²), a stiffness m ω² and a damping m ω. Equations
-(1)-(7) of similar shoes then differ by U m ω/Q alone. Waves as long as U/ω pass as often in a period.
+the mode that vibrates, and of the load Q, an amplitude is Q/(m ω²), a stiffness m ω² and a damping m ω. Equations
+(1)-(7) of similar shoes then differ by U m ω/Q alone. Waves as long as U/ω pass as often in a period, and the pad
+is as many of them long. Nothing but U depends on the radius, and nothing on the length of a smooth pad: both stay.
 """
 
 import math
 import re
+from decimal import Decimal
 from functools import partial
 from typing import NamedTuple
 
@@ -31,18 +33,18 @@ class Scales(NamedTuple):
     time: float = 0.0
     length: float = 0.0
     wavelength: float = 0.0
+    pad: float = 0.0
 
 
 _POWERS = {
     "mass": Scales(mass=1.0),
-    "radius": Scales(length=1.0),
-    "angular_speed": Scales(time=-1.0, length=-1.0, wavelength=1.0),  # U/R, where a wavelength is U times a time
+    "angular_speed": Scales(time=-1.0, wavelength=1.0),  # U/R, where a wavelength is U times a time
     "stiffness": Scales(mass=1.0, time=-2.0),
     "damping": Scales(mass=1.0, time=-1.0),
     "force": Scales(mass=1.0, time=-2.0, length=1.0),
     "forces": Scales(mass=1.0, time=-2.0, length=1.0),
-    "half_length": Scales(length=1.0),
-    "contact.stiffness": Scales(mass=1.0, time=-2.0, length=-1.0),
+    "half_length": Scales(pad=1.0),
+    "contact.stiffness": Scales(mass=1.0, time=-2.0, pad=-1.0),
     "amplitudes": Scales(length=1.0),
     "rms": Scales(length=1.0),
     "wavelengths": Scales(wavelength=1.0),
@@ -94,13 +96,13 @@ class Similar(NamedTuple):
     @property
     def sentence(self) -> str:
         """What is assumed, and what follows."""
-        kept = "friction, angles, and the ratios of all stiffnesses, dampings and lengths are those of the starter"
+        kept = "friction, angles, and the ratios of all stiffnesses and dampings are those of the starter"
         number = f"U m ω/Q is {self.number:.3g} (there {self.before:.3g})"
         regime = "quasi-harmonic: it leaves the wheel and does not stick"
         if self.sticks:
             regime = "relaxation: it sticks in every cycle"
         follows = f", so that it vibrates, {regime}" if self.sticks is not None else "; a run tells what follows"
-        return f"{kept}; {number}{follows}"
+        return f"{kept}, and so is the critical friction; {number}{follows}"
 
 
 def similar(starter: str, text: str, brake: Brake) -> Similar:
@@ -120,7 +122,7 @@ def similar(starter: str, text: str, brake: Brake) -> Similar:
     load = (brake.load or given.load) / given.load
     length = load * time**2 / mass
     speed = brake.speed / given.speed if brake.speed else length / time
-    factors = Scales(mass, time, length, speed * time)
+    factors = Scales(mass, time, length, speed * time, 1.0 if system.smooth else speed * time)
     wanted = _Known(given.mass * mass, frequency / time, given.load * load, given.speed * speed)
     number = _number(wanted)
     sticks = number < STICKS_BELOW if starter == "case" else None
@@ -150,7 +152,7 @@ def _scaled(text: str, factors: Scales, title: str) -> str:
     """A case with all its numbers that have a unit scaled, also those in comments that are keys, speeds or Hz."""
     table = ""
     lines = []
-    for line in text.splitlines():
+    for line in text[text.index("title = ") :].splitlines():  # what stands above is true of the starter
         if header := _HEADER.match(line):
             table = header[1]
             lines.append(_comment(line, factors))
@@ -160,7 +162,10 @@ def _scaled(text: str, factors: Scales, title: str) -> str:
             lines.append(_key(table, key, factors))
         else:
             lines.append(line)
-    return "\n".join([f"# {title}.", "# What comments say of the motion is true of the starter.", "#", *lines, ""])
+    units = (
+        "# All numbers are in SI units, angles in degrees. What comments say of the motion is true of the starter."
+    )
+    return "\n".join([f"# {title}.", "#", units, "", *lines, ""])
 
 
 def _key(table: str, found: re.Match[str], factors: Scales) -> str:
@@ -175,15 +180,25 @@ def _key(table: str, found: re.Match[str], factors: Scales) -> str:
 
 
 def _comment(text: str, factors: Scales) -> str:
-    """A comment whose speeds and frequencies are scaled."""
+    """A comment whose speeds and frequencies are scaled, in as many digits as those have."""
     for unit, powers in _IN_COMMENTS.items():
         number = re.compile(rf"[\d.]+(?=(?: and [\d.]+)? {unit}\b)")
-        text = number.sub(partial(_times, factors, powers), text)
+        text = number.sub(partial(_roughly, factors, powers), text)
     return text
 
 
+def _roughly(factors: Scales, powers: Scales, number: re.Match[str]) -> str:
+    return f"{_product(factors, powers, number[0]):.3g}"
+
+
 def _times(factors: Scales, powers: Scales, number: re.Match[str]) -> str:
-    """A number, scaled, in as many digits as are given of a brake; TOML tells 4 from 4.0."""
-    factor = math.prod(factor**power for factor, power in zip(factors, powers, strict=True))
-    shown = f"{float(number[0]) * factor:.{_DIGITS}g}"
-    return shown if any(sign in shown for sign in ".en") else f"{shown}.0"
+    """A number, scaled, as TOML writes it: in six digits; of waves the factor, so that their ratios stay."""
+    if powers == _POWERS["wavelengths"]:
+        return repr(float(Decimal(number[0]) * Decimal(f"{_product(factors, powers, '1'):.{_DIGITS}g}")))
+    return repr(float(f"{_product(factors, powers, number[0]):.{_DIGITS}g}"))
+
+
+def _product(factors: Scales, powers: Scales, number: str) -> float:
+    """A number times its factor."""
+    scale: float = math.prod(factor**power for factor, power in zip(factors, powers, strict=True))
+    return float(number) * scale

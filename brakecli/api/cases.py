@@ -10,7 +10,7 @@ from brakecli.api.calls import as_files, called, target, telling_to, warn
 from brakecli.api.given import axis_of, case_of, ends_of, mapping, margin_of, patterns_of, pushes_of, study_of
 from brakecli.branches.pushes import PUSHES
 from brakecli.errors import BrakecliError, UsageError
-from brakecli.front.asked import advice_on, stability_of
+from brakecli.front.asked import advice_on, slips_in, stability_of
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -94,6 +94,7 @@ def stability(
         from brakecli.files.as_xarray import dataset, opened
         from brakecli.files.stability_fields import STABILITY, THRESHOLDS
 
+        warn(slips_in(loaded))
         if vary is None:
             return dataset((*STABILITY, *THRESHOLDS), stability_of(loaded, tell, pushes_of(pushes)))
         from brakecli.sweeps.lock_in import lock_in, write
@@ -159,6 +160,7 @@ def branch(
         given: Iterable[Any] = start if isinstance(start, list | tuple) else [start] if start is not None else []
         with as_files(given, "start") as files:
             states = states_of(line, [start_of(file, keys) for file in files])
+        warn(slips_in(loaded))
         found = branch(Explorer(line, tell), states, switch, pushes_of(pushes))
         write(path, loaded, found, unit(keys[0]), force=force)
         return opened(path)
@@ -204,5 +206,5 @@ def advise(
         margin = margin_of(margin)
         study = replace(study_of(scatter), base=loaded) if scatter is not None else None
         report = advice_on(loaded, patterns, margin, study, partial(engine_for, in_caller=True), tell)
-        warn(study.beside(loaded.case) if study else ())
+        warn([*slips_in(loaded), *(study.beside(loaded.case) if study else ())])
         return Advice(**vars(report))

@@ -101,6 +101,7 @@ def sweep(
         with choose_engine(loaded.plan, jobs, scheduler_of(scheduler), in_caller=True) as engine:
             report = sweep(loaded, path, engine, force=force, progress=counting(loaded.plan, tell))
         warn(report.notes)
+        warn(report.findings.warnings)
         if found := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             warn([f"{failed}, the first: {found[0]['reason']}"])

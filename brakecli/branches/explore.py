@@ -215,7 +215,7 @@ class Explorer:
         try:
             return Forced.along(self.line)
         except CaseError as error:
-            self.notes.append("; ".join(each.what for each in error.problems))
+            self.notes.append("; ".join(f"{each.what}; {each.remedy}" for each in error.problems))
             return None
 
     def _forced(self) -> None:

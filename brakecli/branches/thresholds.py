@@ -111,5 +111,6 @@ def _beside(answers: Answers, critical: float) -> str:
     until = "on" if reaches else f"to {high:.4g}{' at least' if cut else ''}"
     words = f"a vibration can exist from {low:.4g} {until}"
     if answers.barrier is not None:
-        words += f", at the case's {answers.own:.4g} after a push beyond {metres(answers.barrier)}"
+        cycle = f"an unstable cycle of {metres(answers.barrier)} lies between the two"
+        words += f"; at the case's {answers.own:.4g} {cycle}"
     return f"{words}; it may begin lower, as {cut[0]}" if cut else words

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from brakecli.cli.options import AsJson, CaseArgument, Details, Overrides, Quiet, option
 from brakecli.cli.output import show_result, warn
-from brakecli.front.asked import advice_on
+from brakecli.front.asked import advice_on, slips_in
 from brakecli.front.inputs import load_case, load_study
 from brakecli.front.progress import telling
 
@@ -34,6 +34,6 @@ def command(
     patterns = keys.split(",") if keys is not None else None
     with telling(quiet) as show_progress:
         report = advice_on(loaded, patterns, margin, study, engine_for, show_progress)
-    warn(*study.beside(loaded.case) if study else ())
+    warn(*slips_in(loaded), *(study.beside(loaded.case) if study else ()))
     view = partial(of_advice, report)
     show_result("advise", report.numbers(), view, as_json=as_json, quiet=quiet, details=details)

@@ -17,8 +17,9 @@ from brakecli.cli.options import (
     option,
     output_option,
 )
-from brakecli.cli.output import show_result
+from brakecli.cli.output import show_result, warn
 from brakecli.files.os_signals import lastly, signals_deferred
+from brakecli.front.asked import slips_in
 from brakecli.front.inputs import load_case, result_path
 from brakecli.front.progress import telling
 from brakecli.stop import hide_signals
@@ -71,6 +72,7 @@ def command(
             hide_signals()  # from what writes the file
             if target:
                 write(target, loaded, found, units, force=force)
+    warn(*slips_in(loaded))
     numbers = {**values_of(BRANCH, found), "output": target and str(target)}
     view = partial(of_branch, numbers, loaded.case.title, units)
     show_result("branch", numbers, view, as_json=as_json, quiet=quiet, details=details)

@@ -53,7 +53,8 @@ def warn(*warnings: str) -> None:
 @contextmanager
 def showing_compilation(seconds: float) -> Iterator[Callable[[int, int], None]]:
     """Show how far all kernels are, which are compiled once and take about so long."""
-    say(f"compiling all numerical kernels, once for this version; this takes about {seconds:.0f} s")
+    takes = f"this takes about {seconds:.0f} s, and longer beside other work"
+    say(f"compiling all numerical kernels, once for this version; {takes}")
     with telling(quiet=False) as tell:
         yield lambda done, total: tell("kernels", done, total)
 

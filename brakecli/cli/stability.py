@@ -16,10 +16,10 @@ from brakecli.cli.options import (
     option,
     output_option,
 )
-from brakecli.cli.output import show_result
+from brakecli.cli.output import show_result, warn
 from brakecli.errors import UsageError, printable
 from brakecli.files.atomic import check_target
-from brakecli.front.asked import stability_of
+from brakecli.front.asked import slips_in, stability_of
 from brakecli.front.inputs import load_case, result_path
 from brakecli.front.progress import telling
 
@@ -70,6 +70,7 @@ def command(
             if target:
                 write(target, loaded, found, force=force)
             numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
+    warn(*slips_in(loaded))
     units = unit(axis.parameter[0]) if axis else ""
 
     def view(show: "Renderer") -> "View":

@@ -54,8 +54,7 @@ def command(
             report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)
     found = report.findings
     warn(*report.notes)
-    if found.warned:
-        warn(f"points that ran with warnings: {found.warned}, the first: {found.first_warning}")
+    warn(*found.warnings)
     numbers = {"output": str(report.output), **report.numbers()}
     show_result("sweep", numbers, partial(of_sweep, report), as_json=as_json, quiet=quiet, details=details)
     for failure in found.failures:

@@ -12,6 +12,14 @@ if TYPE_CHECKING:
     from brakecli.solver.integrate import Counted
 
 
+def slips_in(loaded: LoadedCase) -> list[str]:
+    """Warnings of numbers that no brake has, such as masses in grams."""
+    from brakecli.case.system import system_of
+    from brakecli.runs.plausible import implausible
+
+    return [*implausible(system_of(loaded.case))]
+
+
 def stability_of(loaded: LoadedCase, tell: Counted, pushes: int | None) -> dict[str, Any]:
     """Critical friction, modes and growth of steady sliding, by the names of `--json`.
 

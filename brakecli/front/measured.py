@@ -70,6 +70,9 @@ class Measured:
         del reading["quantity"]
         machine = {key: reading.pop(key) for key in ("belt_speed", "stiffness")}
         signal = read_signal(source, Measurand(name), **reading)
+        if signal.relative and machine["belt_speed"] is not None:
+            what = "a sound file without a unit is relative, so that no speed can be compared with it"
+            raise UsageError(f"{source}: {what}; give {argument('unit')}, or leave out {argument('belt-speed')}")
         return look(signal, Measurand(name), **machine, thresholds=thresholds or SignalThresholds())
 
 

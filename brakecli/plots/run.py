@@ -16,6 +16,7 @@ from brakecli.case.read import LoadedCase, parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, UsageError
 from brakecli.faces import argument
+from brakecli.files.numbers import stored_numbers
 from brakecli.files.read import BLOCK, StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import VARIABLES, Scaled, scaled
@@ -25,6 +26,8 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import times, values
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
+from brakecli.views.motion import motion_sentence
+from brakecli.views.render import TERMINAL
 
 CYCLES = 12  # drawn in detail
 MOST_WORK = 5.0  # of finding steady sliding for the frequencies of its modes
@@ -68,7 +71,7 @@ class RunPicture:
             return lever.get(name, 1.0) * result.read("history", stored.get(name, name), first, stop)
 
         self.title = case.title or "Case without a title"
-        self.summary = _summary(result.attributes)
+        self.summary = _summary(stored_numbers(result))
         start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
         self.span = start, end  # s, of the whole run
         self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
@@ -169,6 +172,8 @@ def _summary(attributes: dict[str, Any]) -> str:
     """Regime, excitation and numbers in one line."""
     if attributes.get("status") == "failed":
         return f"failed at {str(attributes.get('failure', '')).partition(';')[0]}"
+    if attributes.get("vibrations"):
+        return motion_sentence(attributes, TERMINAL)
     regime = attributes.get("regime")
     excitation = attributes.get("excitation")
     parts = [f"{regime}" if excitation == "none" else f"{regime}, {excitation}"]

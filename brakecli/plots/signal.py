@@ -71,6 +71,7 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     m = look.smoothing
     step = look.signal.interval
     name, unit = _VELOCITY.get(look.quantity, ("velocity", "m/s"))
+    unit = look.verdict.unit if look.signal.relative else unit
     smoothed = f", smoothed over {m} samples" * (m > 1)
     axes.set_title(f"{name.capitalize()}{smoothed}")
     if len(velocity.values) < 3 * m:

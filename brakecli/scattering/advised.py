@@ -110,9 +110,10 @@ def under_scatter(
 ) -> AdviceReport:
     """The advice with the probability of squeal that each leaves, by eigenvalues, the least first.
 
-    A key that scatters itself is shifted with its distribution. What leaves samples without a case has none.
+    Squeal counts at any frequency: advice that moves it out of the band of the study does not help. A key that
+    scatters itself is shifted with its distribution. What leaves samples without a case has none.
     """
-    study = loaded.study.model_copy(update={"method": "eigenvalue"})
+    study = loaded.study.model_copy(update={"method": "eigenvalue", "band": None})
     values = drawn(study)
 
     def left(change: Change | None) -> Left | None:

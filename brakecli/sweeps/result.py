@@ -46,8 +46,8 @@ class Findings:
         self.points = plan.passes * plan.points
         self.dimensions = tuple(plan.dimensions)
         self.failed = 0
-        self.warned = 0
-        self.first_warning = ""
+        warnings = 0
+        first = ""
         self.failures: list[dict[str, Any]] = []
         regimes = Counter[bytes]()
         for start, records in journal.blocks():
@@ -57,12 +57,13 @@ class Findings:
                 point = start + place
                 reason = records["reason"][place].decode()
                 self.failures.append({"point": point, "parameters": _parameters(plan, point), "reason": reason})
-            if len(warned) and not self.warned:
-                self.first_warning = records["warning"][warned[0]].decode()
+            if len(warned) and not warnings:
+                first = records["warning"][warned[0]].decode()
             self.failed = self.failed + len(failed)
-            self.warned = self.warned + len(warned)
+            warnings += len(warned)
             names, counts = np.unique(records["regime"], return_counts=True)
             regimes.update(dict(zip(names.tolist(), counts.tolist(), strict=True)))
+        self.warnings = [f"points that ran with warnings: {warnings}, the first: {first}"] if warnings else []
         self.regimes = {name.decode(): count for name, count in sorted(regimes.items())}
         self.hysteresis, said = _hysteresis(journal)
         self.sentences = [*said, *on_short_runs(journal), *_on_undecided(journal), *_on_settled(journal)]
@@ -269,7 +270,7 @@ def _on_settled(journal: Journal) -> Iterator[str]:
         return f"{' to '.join(ends)} s"
 
     count = f"all {size}" if settled.all() else f"{int(settled.sum())} of {size}"
-    said = f"{count} points have settled" + (f", in {ran(settled)}" if settled.any() else "")
+    said = f"{count} points are decided" + (f", in {ran(settled)}" if settled.any() else "")
     yield said + (
         f"; others ran for {ran(rest)}, and their reasons say more" if (rest := done & ~settled).any() else ""
     )

@@ -95,6 +95,8 @@ def motion_sentence(numbers: Mapping[str, Any], show: Renderer, *, full: bool = 
         words = _FORCED
     if not words:
         bursts = len(numbers.get("bursts") or ())
+        if bursts > 1 and reasons.startswith(f"in {bursts} bursts"):
+            return sentence(f"it vibrates {reasons}")
         said = f"it vibrates in {bursts} bursts" if bursts > 1 else "this is not decided (undecided)"
         return sentence(f"{said}: {reasons}")
     named_numbers = _named_numbers(numbers, show) if full else []

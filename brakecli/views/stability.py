@@ -79,9 +79,11 @@ def of_lock_in(numbers: Mapping[str, Any], show: Renderer, units: str) -> View:
 
 
 def _without_loss(numbers: Mapping[str, Any]) -> str:
-    """What there is to say where no friction coefficient makes steady sliding unstable."""
+    """What there is to say where no vibration beside stable sliding was sought."""
     if numbers["no_equilibrium"]:
         return f"there is no steady sliding: {numbers['no_equilibrium']}"
+    if (critical := numbers["critical_friction"]) is not None:
+        return f"sliding loses stability at {critical:.4g}"
     return "no change of stability by friction is found"
 
 

@@ -11,6 +11,8 @@ from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
+from brakecli.runs.plausible import implausible
+from brakecli.solver.period import common_period
 from brakecli.sweeps.simulate import simulate
 from tests.commands import brakecli
 
@@ -65,6 +67,23 @@ def test_waves_pass_as_often_in_a_period() -> None:
     times = 1900.0 / report(parse_case(STARTERS["rough"], "rough").case).modes[0].frequency
     passing = [abs(each.belt_speed) * each.wheel.turns for each in (before, after)]
     assert passing[1] == pytest.approx(times * passing[0], rel=1e-5)
+    pads = [each.half_length * each.wheel.turns for each in (before, after)]
+    assert pads[1] == pytest.approx(pads[0], rel=1e-5)
+
+
+@pytest.mark.parametrize("brake", [*BRAKES, Brake(0.8, 1300.0, 3000.0, 5.0), Brake(0.123, 777.7, 3333.0, 7.77)])
+def test_waves_repeat_together_as_those_of_the_starter_do(brake: Brake) -> None:
+    """Wavelengths of 30 to 17, after 17 of the first."""
+    system = system_of(case_of("rough", brake))
+    period = common_period(system)
+    assert period is not None
+    assert period * system.belt_speed * float(system.wheel.turns[0]) == pytest.approx(17.0, rel=1e-12)
+
+
+def test_radius_and_smooth_pad_keep_to_sizes_that_brakes_have() -> None:
+    after = case_of("branch", Brake(0.8, 1300.0, 3000.0, 5.0))
+    assert (after.wheel.radius, after.contact.half_length) == (0.5, 0.03)
+    assert not [*implausible(system_of(after))]
 
 
 @pytest.mark.parametrize(("part", "regime"), [(0.98, Regime.RELAXATION), (1.02, Regime.QUASI_HARMONIC)])
@@ -83,7 +102,8 @@ def test_the_regime_that_is_named_is_that_of_a_run(part: float, regime: Regime) 
 
 def test_comments_say_the_speed_and_the_frequencies_of_the_brake() -> None:
     smooth = similar("case", STARTERS["case"], Brake(speed=8.0)).text
-    assert "here the surface moves at 8.0 m/s" in smooth
+    assert "here the surface moves at 8 m/s" in smooth
+    assert "# Does" not in smooth  # what the head of the starter says of its motion
     assert smooth.startswith("# A brake of 10 kg at 174.1 Hz, under 5000 N, at 8 m/s")
     rough = similar("rough", STARTERS["rough"], Brake(frequency=1741.1884)).text
     passing = rough.partition("here at ")[2].partition(" Hz")[0].split(" and ")

@@ -71,7 +71,7 @@ def test_they_are_those_of_the_branch_command_over_another_range(number: int) ->
     )
     assert below in str(found.sentence)
     assert f"sliding loses stability at {critical.friction:.4g}; " in str(found.sentence)
-    assert ("after a push beyond" in str(found.sentence)) == (number != SUPERCRITICAL)
+    assert ("lies between the two" in str(found.sentence)) == (number != SUPERCRITICAL)
 
 
 @pytest.mark.parametrize("number", [SUBCRITICAL, *(pytest.param(each, marks=campaign) for each in MORE)])

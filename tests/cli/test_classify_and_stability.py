@@ -284,7 +284,9 @@ def test_stability_and_advise_name_both_thresholds_as_branch_does(here: Path) ->
     for found in (stable.json, advised.json):
         assert found["coexists_from"] == pytest.approx(branch.json["coexists_from"], rel=1e-8)
         assert found["barrier"] == pytest.approx(branch.json["barrier"], rel=1e-6)
-    words = "a vibration can exist from 0.1688 on, at the case's 0.4 after a push beyond 1.4 µm"
+    words = (
+        "a vibration can exist from 0.1688 on; at the case's 0.4 an unstable cycle of 1.4 µm lies between the two"
+    )
     sought = "no other vibration found in 640 pushes"
     assert stable.json["sentence"] == f"sliding loses stability at 0.4877; {words}; {sought}"
     assert branch.json["sentence"].endswith(f"; {sought}")

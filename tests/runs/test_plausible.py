@@ -151,6 +151,8 @@ def test_a_case_in_grams_is_told_so_and_a_sweep_of_it_once(compiled: None, tmp_p
     assert case.told(0).splitlines() == [f"brakecli: warning: {text}"]
     assert case.json["warnings"] == [text]
     run = brakecli("run", "grams.toml", "--json", cwd=tmp_path)
+    for words in ("stability grams.toml", "advise grams.toml", "branch grams.toml --parameter shoe.mass=9e3:1e4"):
+        assert text in brakecli(*words.split(), "-q", cwd=tmp_path).err
     assert text in run.json["warnings"]
     sweep = brakecli("check", "sweep.toml", "--json", cwd=tmp_path)
     assert sweep.told(0).count(text) == 1

@@ -173,7 +173,7 @@ def _judge(
         regime=decision.regime,
         reasons=(decision.sentence,),
         frequency=per_second,
-        amplitude=amplitude if math.isfinite(amplitude) else None,
+        amplitude=amplitude if math.isfinite(amplitude) and not signal.relative else None,
         stick_fraction=stick,
         bursts=(),
         evidence={"row": decision.row, **numbers, "noise": noise},
