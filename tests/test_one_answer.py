@@ -24,6 +24,7 @@ DIGITS = 5e-7
 """Part of a critical value that seven digits do not show: more than any command prints."""
 
 
+@pytest.mark.filterwarnings("ignore::UserWarning")  # random shoes may have numbers that no brake has
 @pytest.mark.parametrize("number", counts(4, 12))
 def test_all_commands_have_the_same_critical_friction(number: int, tmp_path: Path) -> None:
     """`stability`, `advise`, `branch`, a sweep without axes, and a sample of `scatter` that is the case itself."""
