@@ -1,5 +1,6 @@
 """The functions of `import brakecli`: what they return is what the commands write and print."""
 
+import inspect
 import json
 import math
 import multiprocessing
@@ -16,9 +17,11 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
+import typer
 import xarray as xr
 
 import brakecli
+from brakecli.cli.app import app
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from brakecli.front import progress
 from brakecli.front.progress import telling
@@ -742,3 +745,28 @@ def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
     for margin in (-0.1, 11, math.nan, "1"):
         with pytest.raises(UsageError, match="is no number from 0 to 10"):
             brakecli.advise(CASE, margin=margin)  # type: ignore[arg-type]
+
+
+SHELL_ALONE = {"as_json", "details", "quiet", "scheduler_file", "task_size", "second_run"}
+"""How a command prints and cuts its work, a file in the place of an address, and an option that is gone."""
+PYTHON_ALONE = {"progress", "axes", "points", "critical", "direction"}
+"""Who shows progress, and what the shell writes into the file of a sweep."""
+RENAMED = {"overrides": "settings", "file": "source", "sources": "source"}
+READING = {"column", "time_column", "sample_rate", "unit", "time_unit"}
+
+
+@pytest.mark.parametrize("name", sorted({*brakecli.__all__} - {"load"}))
+def test_functions_take_what_commands_take_with_equal_defaults_and_say_so(name: str) -> None:
+    shell = {each.name: each for each in typer.main.get_command(app).commands[name].params}  # type: ignore[attr-defined]
+    python = dict(inspect.signature(getattr(brakecli, name)).parameters)
+    if "reading" in python:
+        python |= dict.fromkeys(READING, python.pop("reading"))
+    of_shell = {RENAMED.get(each, each) for each in shell} - SHELL_ALONE
+    if name == "stability":
+        of_shell -= {"output", "force"}  # of what --vary finds, which a function gives back
+    assert of_shell == {*python} - PYTHON_ALONE
+    for each in shell.keys() & python.keys() - READING:
+        default = python[each].default
+        assert default is inspect.Parameter.empty or (shell[each].default or None) == (default or None), each
+    described = str(getattr(brakecli, name).__doc__)
+    assert [each for each in python.keys() - READING if f"{each}:" not in described] == []
