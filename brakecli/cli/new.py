@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from brakecli.cli.options import Force, Quiet, option, output_option
-from brakecli.cli.output import show
+from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError, printable
 from brakecli.faces import as_argument
 
@@ -64,9 +64,14 @@ def command(
             file.publish()
     if not quiet:
         shown = f"brakecli branch {as_argument(path)} --parameter friction.coefficient=0:1"
-        follows = text == texts["branch"]
+        follows = starter == "branch"
         verb = "scatter" if text == texts["scatter"] else "sweep" if base else "run"
         how = shown if follows else f"brakecli {verb} {as_argument(path)}"
         show(f"{' and '.join(map(str, written))}: written; run it with: {how}")
         if of_brake:
             show(of_brake.sentence)
+    if of_brake:
+        from brakecli.case.read import parse_case
+        from brakecli.front.asked import slips_in
+
+        warn(*slips_in(parse_case(text, str(path))))

@@ -11,7 +11,8 @@ from brakecli.files.read import StoredResult
 from brakecli.plots import over_each_other
 from brakecli.reports.blocks import Beside, Part, Table, Texts, key_unit, percent, picture, rounded, shown
 
-PICTURE = "All results in one picture: the first one wide, the second one dashed, the third one dotted"
+PICTURE = "All results in one picture: the first one wide, the second one dashed"
+THIRD = ", the third one dotted"
 # to which numbers are compared; increase above which there is no per cent
 DIGITS = 4
 MOST_PART = 10.0
@@ -61,7 +62,7 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
     files = [f"{letter}: {part.name}" for letter, part in zip(letters, parts, strict=True)]
     try:
         draw = partial(over_each_other.draw, results, "", files, in_a_row=len(parts) > _NARROW)
-        pictures = [picture(PICTURE, draw)]
+        pictures = [picture(PICTURE + THIRD * (len(parts) > _NARROW), draw)]
     except UsageError:  # no curves that could be drawn over each other
         pictures = [each.picture for each in parts if each.picture]
     titles = [part.title for part in parts]

@@ -133,4 +133,7 @@ def test_new_says_what_is_assumed_and_what_follows(tmp_path: Path) -> None:
     shown = brakecli("new", "squeal", *numbers, cwd=tmp_path).out
     assert "U m ω/Q is 4.78 (there 0.109)" in shown
     assert "quasi-harmonic" in shown
+    grams = brakecli("new", "squeal", "--mass", "400", "--load", "8", "--force", cwd=tmp_path)
+    assert "shoe.mass: 400 kg is more than 300 kg; were grams meant?" in grams.err
+    brakecli("new", "squeal", *numbers, "--force", cwd=tmp_path)
     assert parse_case((tmp_path / "squeal.toml").read_text(), "squeal").case.shoe.mass == 0.4
