@@ -279,7 +279,7 @@ def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> N
     few = ("--set", "samples=64")
     command("scatter", "scatter.toml", *few, "-q", cwd=tmp_path)
     assert "scatter.png: written" in command("plot", "scatter.h5", cwd=tmp_path).out
-    command("report", "scatter.h5", "-o", "scatter.html", cwd=tmp_path)
+    command("report", "scatter.h5", "--full", "-o", "scatter.html", cwd=tmp_path)
     page = (tmp_path / "scatter.html").read_text()
     for text in ("How likely do such brakes squeal", "brakecli scatter STUDY.toml", "[[parameter]]"):
         assert text in page
