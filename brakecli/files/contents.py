@@ -10,9 +10,9 @@ import numpy as np
 
 from brakecli.errors import UsageError, printable
 from brakecli.files.field import Field, flat, integer, named, plain, plain_units, ratio
-from brakecli.files.fields import COMPARISON, OBJECT, RUN, SWEEP, TEXT, WELCH
+from brakecli.files.fields import OBJECT, RUN, TEXT, WELCH
+from brakecli.files.numbers import DECLARED
 from brakecli.files.read import BLOCK, StoredResult, Variable
-from brakecli.files.stability_fields import BRANCH, LOCK_IN, SCATTER
 from brakecli.files.toml_lines import parse
 from brakecli.files.write import FILL
 
@@ -31,14 +31,6 @@ _APART = {
 _RISING = ("time", "frequency")  # axes along which values are interpolated
 _NAMED = 3  # keys of the case in a sentence
 _ROUNDING = 1e-9  # of the largest value, which interpolation may add
-_DECLARED = {
-    "run": RUN,
-    "sweep": SWEEP,
-    "comparison": COMPARISON,
-    "stability": LOCK_IN,
-    "branch": BRANCH,
-    "scatter": SCATTER,
-}
 
 HELD = (
     Field("group", "", "group of the file", TEXT),
@@ -153,7 +145,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
                     value = plain(value)  # xarray takes a list of one for a number
                     value = value[0] if isinstance(value, list) and len(value) == 1 else value
                     found[name if group == "/" else f"{group}/{name}"] = value
-    declared = _DECLARED.get(kinds[0], ())
+    declared = DECLARED.get(kinds[0], ())
     rows = ((field.group, row) for field in declared for row in (field.rows if field.group else [field]))
     units = {f"{group}/{row.name}": row.units for group, row in rows}
     units |= {f"spectrum/{field.name}": field.units for field in WELCH}

@@ -8,7 +8,7 @@ from brakecli.files.field import Field, plain
 from brakecli.files.read import StoredResult
 from brakecli.files.write import FILL
 
-_DECLARED = {
+DECLARED = {
     "run": fields.RUN,
     "sweep": fields.SWEEP,
     "comparison": fields.COMPARISON,
@@ -21,7 +21,7 @@ _DECLARED = {
 def stored_numbers(result: StoredResult) -> dict[str, Any]:
     """Names and values, None where there is none. Raises UnreadableResultError."""
     kind = str(result.attributes.get("kind"))
-    declared = _DECLARED.get(kind, ())
+    declared = DECLARED.get(kind, ())
     held = {name: plain(value) for name, value in result.attributes.items()}
     there = result.groups
     objects = {each.name: dict(result.group_attributes(each.group)) for each in declared if each.group in there}

@@ -19,9 +19,9 @@ from brakecli.case.tables import key_schema
 from brakecli.errors import escaped
 from brakecli.files import fields
 from brakecli.files.field import flat, named, values_of
+from brakecli.files.numbers import stored_numbers
 from brakecli.files.read import StoredResult
 from brakecli.files.stability_fields import ADVICE, STABILITY, THRESHOLDS
-from brakecli.files.write import FILL
 from brakecli.plots import lock_in, style
 from brakecli.plots.result import draw
 from brakecli.plots.run import case_of
@@ -36,6 +36,7 @@ from brakecli.reports.blocks import (
     numbers_of,
     percent,
     picture,
+    rounded,
     shown,
 )
 from brakecli.runs.advise import AdviceReport, advise
@@ -57,7 +58,7 @@ VALUES = 121  # of the friction in the lock-in diagram
 # keys on the first page
 MOST_CHANGES = 5
 MOST_WORK = 60.0  # of asking all, as `runs.work` counts it
-_UNITS = [each.units for each in fields.VIBRATION]
+DIGITS = 4  # of an interval of vibration
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _MAIN = (
     *("regime", "excitation", "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
@@ -75,8 +76,7 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     loaded = case_of(result)
     advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_WORK), loaded.case)
     theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
-    said = {**found, "vibrations": _vibrations(result), "evidence": result.group_attributes("regime/evidence")}
-    answer = [motion_sentence(said, PAGE, full=True), theory]
+    answer = [motion_sentence(stored_numbers(result), PAGE, full=True), theory]
     name = escaped(result.path.name)
     title = loaded.case.title or "Case without a title"
     numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
@@ -207,23 +207,13 @@ def _regime(result: StoredResult) -> list[Any]:
         for name, value in sorted(evidence.items())
     ]
     reasons = Texts(sentences(reasons_of(found, PAGE)))
-    intervals = [[each[field.name] for field in fields.VIBRATION] for each in _vibrations(result)]
-    head = [each.meaning for each in fields.VIBRATION]
-    beats = [Table([[shown(*each) for each in zip(row, _UNITS, strict=True)] for row in intervals], head)]
+    intervals = stored_numbers(result).get("vibrations") or []
+    vibrations = [
+        [shown(rounded(each[field.name], DIGITS), field.units) for field in fields.VIBRATION] for each in intervals
+    ]
+    beats = [Table(vibrations, [each.meaning for each in fields.VIBRATION])]
     shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the table decided")
     return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
-
-
-def _vibrations(result: StoredResult) -> list[dict[str, float | None]]:
-    """Where speed or load change: the intervals of vibration, four digits of each number."""
-    if "vibrations" not in result.file:
-        return []
-    columns = [result.read("vibrations", each.name) for each in fields.VIBRATION]
-    names = [each.name for each in fields.VIBRATION]
-    rows = [
-        [None if value == FILL else float(f"{value:.4g}") for value in row] for row in zip(*columns, strict=True)
-    ]
-    return [dict(zip(names, row, strict=True)) for row in rows]
 
 
 def _accuracy(result: StoredResult) -> list[Any]:
