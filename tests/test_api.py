@@ -25,6 +25,7 @@ from brakecli.cli.app import app
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
 from brakecli.front import progress
 from brakecli.front.progress import telling
+from brakecli.front.records import Report
 from brakecli.views.view import sentence
 from tests.campaign import campaign
 from tests.commands import QUICK, ROOT, TINY, attributes, left_in
@@ -195,11 +196,11 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
     with pytest.raises(UsageError, match=r"shoe\.mass: cannot be set to NoneType"):
         brakecli.run(CASE, {"shoe.mass": None})
     with pytest.raises(UsageError, match="settings: is no mapping"):
-        brakecli.run(CASE, ["shoe.mass=1"])  # type: ignore[arg-type]
+        brakecli.run(CASE, 5)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="axes: is no mapping"):
         brakecli.sweep(CASE, axes=1.5)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="vary: is no mapping"):
-        brakecli.stability(CASE, vary="x")  # type: ignore[arg-type]
+        brakecli.stability(CASE, vary=5)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="thresholds: is no mapping"):
         brakecli.classify(CASE, thresholds=5)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match=r"vary\.values: cannot be set to Fraction"):
@@ -233,8 +234,8 @@ def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
         brakecli.stability(CASE, vary={"shoe.mass": [1.0, 3.0, 2.0]})
     with pytest.raises(UsageError, match="only for a measured signal"):
         brakecli.classify(tmp_path / "broken.h5", belt_speed=3.0)
-    with pytest.raises(UsageError, match="no argument columns"):
-        brakecli.classify(tmp_path / "broken.h5", columns=3)
+    with pytest.raises(TypeError, match="unexpected keyword argument 'columns'"):
+        brakecli.classify(tmp_path / "broken.h5", columns=3)  # type: ignore[call-arg]
     with pytest.raises(UsageError, match="is no case"):
         brakecli.run(3)  # type: ignore[arg-type]
     with pytest.raises(UsageError, match="no threshold few"):
@@ -747,26 +748,31 @@ def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
             brakecli.advise(CASE, margin=margin)  # type: ignore[arg-type]
 
 
-SHELL_ALONE = {"as_json", "details", "quiet", "scheduler_file", "task_size", "second_run"}
-"""How a command prints and cuts its work, a file in the place of an address, and an option that is gone."""
+SHELL_ALONE = {"as_json", "details", "quiet", "second_run"}
+"""How a command prints, and an option that is gone."""
 PYTHON_ALONE = {"progress", "axes", "points", "critical", "direction"}
 """Who shows progress, and what the shell writes into the file of a sweep."""
-RENAMED = {"overrides": "settings", "file": "source", "sources": "source"}
-READING = {"column", "time_column", "sample_rate", "unit", "time_unit"}
 
 
 @pytest.mark.parametrize("name", sorted({*brakecli.__all__} - {"load"}))
 def test_functions_take_what_commands_take_with_equal_defaults_and_say_so(name: str) -> None:
-    shell = {each.name: each for each in typer.main.get_command(app).commands[name].params}  # type: ignore[attr-defined]
-    python = dict(inspect.signature(getattr(brakecli, name)).parameters)
-    if "reading" in python:
-        python |= dict.fromkeys(READING, python.pop("reading"))
-    of_shell = {RENAMED.get(each, each) for each in shell} - SHELL_ALONE
-    if name == "stability":
-        of_shell -= {"output", "force"}  # of what --vary finds, which a function gives back
-    assert of_shell == {*python} - PYTHON_ALONE
-    for each in shell.keys() & python.keys() - READING:
+    group = typer.main.get_group(app)
+    command = group.get_command(typer.Context(group), name)
+    assert command is not None
+    shell = {each.name: each for each in command.params}
+    python = inspect.signature(getattr(brakecli, name)).parameters
+    assert shell.keys() - SHELL_ALONE == python.keys() - PYTHON_ALONE
+    for each in shell.keys() & python.keys():
         default = python[each].default
         assert default is inspect.Parameter.empty or (shell[each].default or None) == (default or None), each
+        assert shell[each].help, each  # type: ignore[attr-defined]
     described = str(getattr(brakecli, name).__doc__)
-    assert [each for each in python.keys() - READING if f"{each}:" not in described] == []
+    assert [each for each in python if f"{each}:" not in described] == []
+    assert "{options}" not in described
+
+
+def test_the_page_takes_any_number_of_results_and_else_what_its_record_has() -> None:
+    function = inspect.signature(brakecli.report).parameters
+    record = inspect.signature(Report).parameters
+    assert [*function] == [*record]
+    assert [each.default for each in function.values()] == [each.default for each in record.values()]

@@ -3,23 +3,19 @@
 import tempfile
 import threading
 import warnings
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING
 
 from brakecli.errors import UsageError, found
 from brakecli.faces import in_python
 from brakecli.stop import signals_shown
 
 if TYPE_CHECKING:
-    import xarray as xr
-
+    from brakecli.front.records import Counter, Result
     from brakecli.solver.integrate import Counted
-
-    Result: TypeAlias = str | PathLike[str] | xr.Dataset | xr.DataTree
-    Progress = bool | Callable[[str, int, int], None]
 
 
 @contextmanager
@@ -45,7 +41,7 @@ class _OfCaller(BaseException):
 
 
 @contextmanager
-def telling_to(progress: "Progress") -> Iterator["Counted"]:
+def telling_to(progress: "Counter") -> Iterator["Counted"]:
     """What tells the progress: a function of the caller, or that of the commands.
 
     What the function of the caller raises comes out of the block as it was raised.
@@ -105,6 +101,6 @@ def as_files(results: "Iterable[Result]", *names: str) -> Iterator[list[Path]]:
 
 
 def warn(texts: Iterable[str]) -> None:
-    """Warn of each text, at the line of whoever called the function of `import brakecli`."""
+    """Warn of each text, at the line of whoever called the function of a record."""
     for text in texts:
-        warnings.warn(text, stacklevel=3)
+        warnings.warn(text, stacklevel=4)

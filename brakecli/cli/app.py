@@ -15,7 +15,6 @@ import typer
 from typer.core import TyperGroup
 
 from brakecli.about import __released__, __version__
-from brakecli.cli.options import option
 from brakecli.cli.output import announce_compilation, show, showing_compilation, warn
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.faces import as_argument
@@ -45,6 +44,7 @@ CITATION = f"""\
 }}"""
 """How to cite the program and the paper, in BibTeX; CITATION.cff says the same."""
 
+SETTINGS = {"help_option_names": ["-h", "--help"]}
 INDENT = 6
 """Columns of `--help` beside names and descriptions of commands."""
 LIBRARIES = 1_075_000_000
@@ -52,15 +52,31 @@ LIBRARIES = 1_075_000_000
 
 
 class Grouped(TyperGroup):
-    """The program, whose help lists commands by their groups."""
+    """The program, whose help lists commands by their groups; a command is imported when it is asked for."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """The names of all commands."""
+        return [*chain(*GROUPS.values())]
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """The command of a name; None if there is none, and all are known then, of which one is meant."""
+        names = self.list_commands(ctx)
+        for name in [cmd_name] if cmd_name in names else names:
+            if name not in self.commands:
+                alone = typer.Typer(add_completion=False, rich_markup_mode=None, context_settings=SETTINGS)
+                alone.command(name)(import_module(f"brakecli.cli.{name.replace('-', '_')}").command)
+                self.commands[name] = typer.main.get_command(alone)
+        return self.commands.get(cmd_name)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a section for each group."""
-        longest = max(map(len, self.commands))
+        longest = max(map(len, self.list_commands(ctx)))
         limit = formatter.width - longest - INDENT
         for title, names in GROUPS.items():
             with formatter.section(title):
-                rows = [(name.ljust(longest), self.commands[name].get_short_help_str(limit)) for name in names]
+                rows = [
+                    (name.ljust(longest), self.get_command(ctx, name).get_short_help_str(limit)) for name in names
+                ]
                 formatter.write_dl(rows)
 
 
@@ -70,11 +86,9 @@ app = typer.Typer(
     no_args_is_help=True,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
-    context_settings={"help_option_names": ["-h", "--help"]},
+    context_settings=SETTINGS,
     help="Vibration of a brake shoe on a rough wheel: will it vibrate, how, from which friction coefficient on.",
 )
-for name in chain(*GROUPS.values()):
-    app.command(name)(import_module(f"brakecli.cli.{name.replace('-', '_')}").command)
 
 
 def main() -> None:
@@ -112,9 +126,9 @@ def _print_citation(wanted: bool) -> None:
         raise typer.Exit
 
 
-VERSION = option("Print the version and exit.", None, "--version", callback=_print_version, is_eager=True)
-CITE = option(
-    "Print how to cite it, in BibTeX, and exit.", None, "--cite", callback=_print_citation, is_eager=True
+VERSION = typer.Option("--version", help="Print the version and exit.", callback=_print_version, is_eager=True)
+CITE = typer.Option(
+    "--cite", help="Print how to cite it, in BibTeX, and exit.", callback=_print_citation, is_eager=True
 )
 
 

@@ -1,26 +1,34 @@
 """`brakecli check`."""
 
 import math
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import AsJson, Overrides, Quiet, source_argument
+from brakecli.cli.options import AsJson, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.front.inputs import kind_of_file, load_case, load_sweep
+from brakecli.front.given import case_of, overrides
+from brakecli.front.inputs import kind_of_file, load_sweep
+from brakecli.front.options import Description
+from brakecli.front.records import Settings
 
 OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
 
 
-def command(
-    file: Annotated[str, source_argument("FILE.toml", 'Case or sweep file, or "-" for standard input.')],
-    overrides: Overrides = None,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
-) -> None:
+@dataclass(frozen=True)
+class Check:
+    """Options of `check`."""
+
+    file: Annotated[str, Description('Case or sweep file, or "-" for standard input.', "FILE.toml", by_place=True)]
+    settings: Settings = None
+
+
+@with_options
+def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> None:
     """Validate a case or a sweep; what it takes, its limits."""
-    if kind_of_file(file) == "sweep":
-        sweep = load_sweep(file, overrides)
+    if kind_of_file(options.file) == "sweep":
+        sweep = load_sweep(options.file, overrides(options.settings))
         from brakecli.runs.limits import free_bytes
         from brakecli.sweeps.driver import crew
         from brakecli.sweeps.size import refuse_sweep, size_of
@@ -33,7 +41,7 @@ def command(
         warn(*size.refused, *size.implausible)
         refuse_sweep(size, free_bytes(Path()))
         return
-    loaded = load_case(file, overrides)
+    loaded = case_of(options.file, options.settings)
     from brakecli.case.system import system_of
     from brakecli.runs.limits import check, free_bytes, refuse, within_range
     from brakecli.views.file import of_check

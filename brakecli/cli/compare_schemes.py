@@ -1,43 +1,44 @@
 """`brakecli compare-schemes`."""
 
-from pathlib import Path
+from dataclasses import dataclass
 from typing import Annotated
 
-from brakecli.cli.options import (
-    AsJson,
-    CaseArgument,
-    Details,
-    Force,
-    Overrides,
-    Quiet,
-    option,
-    output_option,
-)
+from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result
-from brakecli.front.inputs import load_case, result_path
+from brakecli.front.given import case_of
+from brakecli.front.inputs import result_path
+from brakecli.front.options import Description
 from brakecli.front.progress import telling
+from brakecli.front.records import Case, Force, Settings, target
 from brakecli.solver.schemes import SCHEMES
 
-STEPS = "Time steps in s; the largest is a whole multiple of each."
-TARGET = "Recommend the cheapest method with this error."
+
+@dataclass(frozen=True)
+class CompareSchemes:
+    """Options of `compare-schemes`."""
+
+    case: Case
+    settings: Settings = None
+    output: Annotated[str | None, target("Result file", "the case's name with -schemes.h5, here")] = None
+    schemes: Annotated[str | None, Description(f"Compare only these: {', '.join(SCHEMES)}.", "NAME,…")] = None
+    steps: Annotated[
+        str | None, Description("Time steps in s; the largest is a whole multiple of each.", "H,…")
+    ] = None
+    budget: Annotated[float, Description("Approximate time to spend.", "SECONDS", least=1.0, most=86400.0)] = 60.0
+    target_error: Annotated[
+        float,
+        Description("Recommend the cheapest method with this error.", "E", least=1e-12, most=1.0),
+    ] = 1e-3
+    force: Force = False
 
 
+@with_options
 def command(
-    case: CaseArgument,
-    output: Annotated[Path | None, output_option("Result file", "the case's name with -schemes.h5, here")] = None,
-    overrides: Overrides = None,
-    schemes: Annotated[str | None, option(f"Compare only these: {', '.join(SCHEMES)}.", "NAME,…")] = None,
-    steps: Annotated[str | None, option(STEPS, "H,…")] = None,
-    budget: Annotated[float, option("Approximate time to spend.", "SECONDS", min=1.0, max=86400.0)] = 60.0,
-    target_error: Annotated[float, option(TARGET, "E", min=1e-12, max=1.0)] = 1e-3,
-    force: Force = False,
-    details: Details = False,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
+    options: CompareSchemes, details: Details = False, as_json: AsJson = False, quiet: Quiet = False
 ) -> None:
     """Compare all schemes by error and cost; recommend one."""
-    loaded = load_case(case, overrides)
-    target = result_path(output, case, ending="-schemes.h5")
+    loaded = case_of(options.case, options.settings)
+    target = result_path(options.output, options.case, ending="-schemes.h5")
     from brakecli.comparison.compare import compare
     from brakecli.comparison.methods import parse_schemes, parse_steps
     from brakecli.comparison.result import ComparisonReport, write
@@ -45,15 +46,15 @@ def command(
     from brakecli.runs.run import load_kernels
     from brakecli.views.points import of_comparison
 
-    chosen = parse_schemes(schemes)
-    ladder = parse_steps(steps)
+    schemes = parse_schemes(options.schemes)
+    steps = parse_steps(options.steps)
     system = load_kernels(loaded)
-    with telling(quiet) as show_progress:
-        with new_result(target, force=force):  # whether it can be written is known before anything is computed
+    with telling(quiet) as tell:
+        with new_result(target, force=options.force):  # whether it can be written is known beforehand
             pass
-        found = compare(system, schemes=chosen, steps=ladder, budget=budget, progress=show_progress)
-        report = ComparisonReport(target, loaded.case, found, target_error)
-        write(target, loaded, report, force=force)
+        found = compare(system, schemes=schemes, steps=steps, budget=options.budget, progress=tell)
+        report = ComparisonReport(target, loaded.case, found, options.target_error)
+        write(target, loaded, report, force=options.force)
     numbers = {"output": str(target), **report.numbers()}
     show_result(
         "compare-schemes",

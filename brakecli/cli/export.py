@@ -1,37 +1,61 @@
 """`brakecli export`."""
 
 import math
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.cli.options import Force, Quiet, option, output_option, source_argument
+from brakecli.cli.options import Quiet, with_options
 from brakecli.cli.output import show, warn
 from brakecli.front.inputs import result_path
+from brakecli.front.options import Description
 from brakecli.front.progress import telling
-
-GROUP = "Of a run: history (default), spectrum, over_time, spectrogram, vibrations."
-VARIABLE = "Variable to export, of a table repeatable; all of them, or vx for sound, if left out."
+from brakecli.front.records import Force, target
 
 
-def command(
-    result: Annotated[Path, source_argument("FILE.h5", "Result of a run, a sweep, a comparison or stability.")],
-    output: Annotated[Path | None, output_option("File, .csv or .wav", "FILE.csv, here")] = None,
-    variables: Annotated[list[str] | None, option(VARIABLE, "NAME", "--variable")] = None,
-    group: Annotated[str | None, option(GROUP, "GROUP")] = None,
-    start: Annotated[float | None, option("First time in s, of what has a time.", "S", "--from")] = None,
-    end: Annotated[float | None, option("Last time in s.", "S", "--to")] = None,
-    every: Annotated[int, option("Keep one of so many samples, the first one among them.", "N", min=1)] = 1,
-    force: Force = False,
-    quiet: Quiet = False,
-) -> None:
+@dataclass(frozen=True)
+class Export:
+    """Options of `export`."""
+
+    result: Annotated[
+        str, Description("Result of a run, a sweep, a comparison or stability.", "FILE.h5", by_place=True)
+    ]
+    output: Annotated[str | None, target("File, .csv or .wav", "FILE.csv, here")] = None
+    variables: Annotated[
+        list[str] | None,
+        Description(
+            "Variable to export, of a table repeatable; all of them, or vx for sound, if left out.",
+            "NAME",
+            names=("--variable",),
+            shell=list[str],
+        ),
+    ] = None
+    group: Annotated[
+        str | None,
+        Description("Of a run: history (default), spectrum, over_time, spectrogram, vibrations.", "GROUP"),
+    ] = None
+    start: Annotated[float | None, Description("First time in s, of what has a time.", "S", names=("--from",))] = (
+        None
+    )
+    end: Annotated[float | None, Description("Last time in s.", "S", names=("--to",))] = None
+    every: Annotated[int, Description("Keep one of so many samples, the first one among them.", "N", least=1)] = 1
+    force: Force = False
+
+
+@with_options
+def command(options: Export, quiet: Quiet = False) -> None:
     """Write numbers as CSV, or a motion as sound."""
     from brakecli.files.export import Part, export
     from brakecli.files.read import open_result
 
-    target = result_path(output, str(result), ending=".csv")
-    with telling(quiet) as tell, open_result(result) as stored:
-        part = Part(-math.inf if start is None else start, math.inf if end is None else end, every)
-        notes = export(stored, target, group, variables or (), part, force=force, tell=tell)
+    target = result_path(options.output, options.result, ending=".csv")
+    start = -math.inf if options.start is None else options.start
+    end = math.inf if options.end is None else options.end
+    part = Part(start, end, options.every)
+    with telling(quiet) as tell, open_result(Path(options.result)) as stored:
+        notes = export(
+            stored, target, options.group, options.variables or (), part, force=options.force, tell=tell
+        )
     warn(*notes)
     if not quiet:
         show(f"{target}: written")

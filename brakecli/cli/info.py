@@ -1,20 +1,30 @@
 """`brakecli info`."""
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from brakecli.cli.check import command as check
-from brakecli.cli.options import AsJson, source_argument
+from brakecli.cli.options import AsJson, with_options
 from brakecli.cli.output import show_result
+from brakecli.front.options import Description
 
 
-def command(
-    file: Annotated[str, source_argument("FILE", "Result of any kind; of a case or a sweep what `check` says.")],
-    as_json: AsJson = False,
-) -> None:
+@dataclass(frozen=True)
+class Info:
+    """Options of `info`."""
+
+    file: Annotated[
+        str, Description("Result of any kind; of a case or a sweep what `check` says.", "FILE", by_place=True)
+    ]
+
+
+@with_options
+def command(options: Info, as_json: AsJson = False) -> None:
     """What a result holds, whether it is whole, what made it."""
+    file = options.file
     if file == "-" or Path(file).suffix == ".toml":
-        check(file, as_json=as_json)
+        check(file=file, settings=None, as_json=as_json, quiet=False)
         return
     from brakecli.files.contents import INFO, contents
     from brakecli.files.field import values_of

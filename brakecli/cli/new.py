@@ -1,30 +1,42 @@
 """`brakecli new`."""
 
+from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
-from brakecli.cli.options import Force, Quiet, option, output_option
+from brakecli.cli.options import Quiet, with_options
 from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError, printable
 from brakecli.faces import as_argument
+from brakecli.front.options import Description
+from brakecli.front.records import Force, target
 
-NAME = "Name of the file, with or without .toml; that of a starter gives this one, others the starter of a case."
+
+@dataclass(frozen=True)
+class New:
+    """Options of `new`."""
+
+    name: Annotated[
+        str,
+        Description(
+            "Name of the file, with or without .toml; that of a starter gives this one, others the starter of a "
+            "case.",
+            "NAME",
+            by_place=True,
+        ),
+    ] = "case"
+    listed: Annotated[bool, Description("List the starters with their questions.", names=("--list",))] = False
+    output: Annotated[str | None, target("File to write", "NAME.toml")] = None
+    mass: Annotated[float | None, Description("Mass of the shoe of a brake of your own.", "KG")] = None
+    frequency: Annotated[float | None, Description("Frequency of the mode that vibrates.", "HZ")] = None
+    load: Annotated[float | None, Description("Force that presses the shoe on.", "N")] = None
+    speed: Annotated[float | None, Description("Speed of the wheel's surface.", "M/S")] = None
+    force: Force = False
 
 
-def command(
-    name: Annotated[str, typer.Argument(metavar="NAME", help=NAME)] = "case",
-    listed: Annotated[bool, option("List the starters with their questions.", None, "--list")] = False,
-    output: Annotated[Path | None, output_option("File to write", "NAME.toml")] = None,
-    mass: Annotated[float | None, option("Mass of the shoe of a brake of your own.", "KG")] = None,
-    frequency: Annotated[float | None, option("Frequency of the mode that vibrates.", "HZ")] = None,
-    load: Annotated[float | None, option("Force that presses the shoe on.", "N")] = None,
-    speed: Annotated[float | None, option("Speed of the wheel's surface.", "M/S")] = None,
-    force: Force = False,
-    quiet: Quiet = False,
-) -> None:
+@with_options
+def command(options: New, quiet: Quiet = False) -> None:
     """Write a commented case that runs, also of your own brake."""
     from brakecli.analysis.similar import Brake, similar
     from brakecli.case.read import starters
@@ -32,13 +44,14 @@ def command(
     from brakecli.views.terminal import grid
 
     texts = starters()
-    if listed:
+    name = options.name
+    if options.listed:
         questions = [text.partition("\n")[0].removeprefix("# ") for text in texts.values()]
         show(grid({"starter": [*texts], "its question": questions}))
         return
     if not name:
         raise UsageError("the name is empty; give one, or leave it out for case.toml")
-    path = output or Path(name if name.endswith(".toml") else f"{name}.toml")
+    path = Path(options.output or (name if name.endswith(".toml") else f"{name}.toml"))
     starter = name.removesuffix(".toml")
     text = texts.get(starter, texts["case"])
     near = get_close_matches(starter, texts, n=1, cutoff=0.7)
@@ -46,7 +59,7 @@ def command(
         remedy = f"did you mean {near[0]}? A file of that name has the option -o"
         raise UsageError(f"no starter is called {printable(starter)}; {remedy}")
     base = text.partition('\ncase = "')[2].partition('"')[0]
-    brake = Brake(mass, frequency, load, speed)
+    brake = Brake(options.mass, options.frequency, options.load, options.speed)
     of_brake = None
     if brake != Brake():
         if base:
@@ -59,7 +72,7 @@ def command(
     if base and not (path.parent / base).exists():
         written[path.parent / base] = texts[base.removesuffix(".toml")]
     for place, content in written.items():
-        with new_output(place, force=force) as file:
+        with new_output(place, force=options.force) as file:
             file.write(content.encode())
             file.publish()
     if not quiet:
@@ -72,6 +85,6 @@ def command(
             show(of_brake.sentence)
     if of_brake:
         from brakecli.case.read import parse_case
-        from brakecli.front.asked import slips_in
+        from brakecli.commands import slips_in
 
         warn(*slips_in(parse_case(text, str(path))))

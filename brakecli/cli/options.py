@@ -1,35 +1,57 @@
-"""Arguments and options, and those that several commands share."""
+"""Arguments and options of the shell: those of a command's record, and how its answer is printed."""
 
+import inspect
+from collections.abc import Callable
+from functools import wraps
 from typing import Annotated, Any
 
 import typer
 
-from brakecli.branches.pushes import MOST_PUSHES
 from brakecli.cli.output import warn
+from brakecli.front.options import Description, described
 from brakecli.solver import compiling
 
 
-def source_argument(metavar: str, content: str) -> Any:
-    """The file that a command reads."""
-    return typer.Argument(metavar=metavar, help=content, show_default=False)
+def with_options(command: Callable[..., None]) -> Callable[..., None]:
+    """A command with the fields of its record in the place of its parameter `options`."""
+    own = inspect.signature(command).parameters
+    record = own["options"].annotation
+    fields = inspect.signature(record).parameters
+    shared = [_as_in_typer(fields[name], said) for name, said in described(record).items() if said.in_shell]
+    beside = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for name, each in own.items() if name != "options"]
+
+    @wraps(command)
+    def called(**given: Any) -> None:
+        options = record(**{each.name: given.pop(each.name) for each in shared})
+        command(options, **given)
+
+    called.__signature__ = inspect.Signature([*shared, *beside])  # type: ignore[attr-defined]
+    return called
 
 
-def option(description: str, metavar: str | None = None, *names: str, **more: Any) -> Any:
-    """An option, named like its parameter if no names are given."""
-    return typer.Option(*names, metavar=metavar, help=description, **more)
+def _as_in_typer(field: inspect.Parameter, said: Description) -> inspect.Parameter:
+    """The field of a record as typer has an option, of the type that the shell gives."""
+    required = field.default is inspect.Parameter.empty
+    meaning = f"{said.meaning}  [default: {said.default}]" if said.default else said.meaning
+    if said.by_place:
+        shown = typer.Argument(metavar=said.metavar, help=meaning, show_default=False)
+    else:
+        shown = typer.Option(
+            *(said.names or (f"--{field.name.replace('_', '-')}",)),
+            metavar=said.metavar,
+            help=meaning,
+            min=said.least,
+            max=said.most,
+            show_default=not required,
+        )
+    kind = said.shell or _plain_type(field.annotation.__origin__)
+    optional = kind | None if field.default is None else kind
+    return field.replace(kind=field.KEYWORD_ONLY, annotation=Annotated[optional, shown])
 
 
-def output_option(content: str, default: str) -> Any:
-    """The file that a command writes."""
-    return option(f"{content}  [default: {default}]", "PATH", "--output", "-o")
-
-
-CaseArgument = Annotated[str, source_argument("CASE.toml", 'Case file, or "-" for standard input.')]
-SET = "KEY.PATH=VALUE", "--set"
-Overrides = Annotated[list[str] | None, option("Set a key of the case, the value in TOML; repeatable.", *SET)]
-PUSHED = "Five times as many pushes seek further vibrations; 0 for none."
-Pushes = Annotated[int, option(PUSHED, "N", min=0, max=MOST_PUSHES)]
-AsJson = Annotated[bool, option("Print one JSON object on standard output, nothing else.", None, "--json")]
+def _plain_type(annotation: Any) -> Any:
+    """The first type of an annotation that the shell has; it gives anything else as text."""
+    return next((kind for kind in (bool, int, float) if annotation in (kind, kind | None)), str)
 
 
 def _compile_in_silence(quiet: bool) -> bool:
@@ -39,9 +61,11 @@ def _compile_in_silence(quiet: bool) -> bool:
     return quiet
 
 
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object on standard output, nothing else.")]
 Details = Annotated[
-    bool, option("Print all: evidence, scheme, model, account of energies, every row.", None, "--details")
+    bool, typer.Option("--details", help="Print all: evidence, scheme, model, account of energies, every row.")
 ]
-QUIET = option("Print nothing but warnings and errors.", None, "--quiet", "-q", callback=_compile_in_silence)
-Quiet = Annotated[bool, QUIET]
-Force = Annotated[bool, option("Replace an existing output.", None, "--force")]
+Quiet = Annotated[
+    bool,
+    typer.Option("--quiet", "-q", help="Print nothing but warnings and errors.", callback=_compile_in_silence),
+]

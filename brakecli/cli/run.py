@@ -1,44 +1,27 @@
 """`brakecli run`."""
 
 from functools import partial
-from pathlib import Path
-from typing import Annotated
 
-from brakecli.cli.options import (
-    AsJson,
-    Details,
-    Force,
-    Overrides,
-    Quiet,
-    output_option,
-    source_argument,
-)
+from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
-from brakecli.front.inputs import load_case, result_path
+from brakecli.front.given import case_of
+from brakecli.front.inputs import result_path
 from brakecli.front.progress import say, telling
+from brakecli.front.records import Run
 
-SOURCE = 'Case file, "-" for standard input, or a result file, whose case is run again.'
 
-
-def command(
-    case: Annotated[str, source_argument("CASE.toml", SOURCE)],
-    output: Annotated[Path | None, output_option("Result file", "the case's name with .h5, here")] = None,
-    overrides: Overrides = None,
-    force: Force = False,
-    details: Details = False,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
-) -> None:
+@with_options
+def command(options: Run, details: Details = False, as_json: AsJson = False, quiet: Quiet = False) -> None:
     """Simulate one case; write motion and regime to HDF5."""
-    loaded = load_case(case, overrides)
-    target = result_path(output, case)
+    loaded = case_of(options.case, options.settings)
+    target = result_path(options.output, options.case)
     from brakecli.runs.run import load_kernels, origin, run
     from brakecli.views.motion import of_run
 
     load_kernels(loaded)
-    with telling(quiet) as show_progress:
-        report = run(loaded, target, force=force, progress=show_progress)
+    with telling(quiet) as tell:
+        report = run(loaded, target, force=options.force, progress=tell)
     if not quiet:
         say(*report.check.adjustments)
     warn(*report.warnings)

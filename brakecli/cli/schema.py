@@ -1,22 +1,30 @@
 """`brakecli schema`."""
 
+from dataclasses import dataclass
 from typing import Annotated
 
-import typer
-
+from brakecli.cli.options import with_options
 from brakecli.cli.output import show_json
 from brakecli.errors import UsageError
+from brakecli.front.options import Description
 
 
-def command(
-    kind: Annotated[str, typer.Argument(metavar="[case|sweep|scatter]", help="Which kind of file.")] = "case",
-) -> None:
+@dataclass(frozen=True)
+class Schema:
+    """Options of `schema`."""
+
+    kind: Annotated[str, Description("Which kind of file.", "[case|sweep|scatter]", by_place=True)] = "case"
+
+
+@with_options
+def command(options: Schema) -> None:
     """Print the JSON Schema of cases, sweeps or studies."""
     from brakecli.case.case import Case
     from brakecli.case.tables import Table, json_schema
     from brakecli.scattering.study import Study
     from brakecli.sweeps.tables import Sweep
 
+    kind = options.kind
     tables: dict[str, type[Table]] = {"case": Case, "sweep": Sweep, "scatter": Study}
     if kind not in tables:
         raise UsageError(f"schema {kind}: there is none; give {', '.join(tables)}")

@@ -1,57 +1,36 @@
 """`brakecli sweep`."""
 
+from dataclasses import replace
 from functools import partial
-from pathlib import Path
-from typing import Annotated
 
-from brakecli.cli.options import SET, AsJson, Details, Quiet, option, output_option, source_argument
+from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
+from brakecli.commands import sweep
 from brakecli.errors import BrakecliError
-from brakecli.front.inputs import load_sweep, result_path
+from brakecli.front.given import sweep_of_options
+from brakecli.front.inputs import result_path
 from brakecli.front.progress import say, telling
-
-JOBS = "Worker processes  [default: one for each core; none for a second of work]"
-SCHEDULER = "Compute on a dask cluster: the scheduler's address, as tcp://host:8786."
-SCHEDULER_FILE = "The same cluster, given by the scheduler's file."
-TASK_SIZE = "Points in each task  [default: as many as take 0.2 s]"
-SETTING = "Set a key of the base case or of [critical]; repeatable."
-REPLACE = "Replace an existing output, and drop finished points of another sweep."
+from brakecli.front.records import Sweep
 
 
-def command(
-    file: Annotated[str, source_argument("SWEEP.toml", 'Sweep file, or "-" for standard input.')],
-    output: Annotated[Path | None, output_option("Result file", "the sweep's name with .h5, here")] = None,
-    overrides: Annotated[list[str] | None, option(SETTING, *SET)] = None,
-    jobs: Annotated[int | None, option(JOBS, None, "--jobs", "-j", min=1, max=4096)] = None,
-    scheduler: Annotated[str | None, option(SCHEDULER, "ADDRESS", envvar="DASK_SCHEDULER_ADDRESS")] = None,
-    scheduler_file: Annotated[str | None, option(SCHEDULER_FILE, "FILE")] = None,
-    task_size: Annotated[int | None, option(TASK_SIZE, min=1)] = None,
-    force: Annotated[bool, option(REPLACE, None, "--force")] = False,
-    details: Details = False,
-    as_json: AsJson = False,
-    quiet: Quiet = False,
-) -> None:
+@with_options
+def command(options: Sweep, details: Details = False, as_json: AsJson = False, quiet: Quiet = False) -> None:
     """Simulate a grid of cases, or search for critical values.
 
     The same command continues an interrupted sweep.
     """
-    loaded = load_sweep(file, overrides)
-    target = result_path(output, file, kind="sweep")
-    from brakecli.runs.run import load_kernels
-    from brakecli.sweeps.driver import choose_engine, counting, keeping_points, sweep
+    loaded = sweep_of_options(options)
+    target = result_path(options.output, options.source, kind="sweep")
+    from brakecli.sweeps.driver import keeping_points
     from brakecli.sweeps.size import Size
     from brakecli.views.points import of_sweep
 
-    load_kernels(loaded.base)
-    with telling(quiet) as show_progress:
+    def begin(size: Size, resumed: int) -> None:
+        if not quiet:
+            say(size.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
 
-        def begin(found: Size, resumed: int) -> None:
-            if not quiet:
-                say(found.sentence() + (f"; {resumed} of them are there already" if resumed else ""))
-
-        advance = counting(loaded.plan, show_progress)
-        with keeping_points(target), choose_engine(loaded.plan, jobs, scheduler, scheduler_file) as engine:
-            report = sweep(loaded, target, engine, force=force, task_size=task_size, begin=begin, progress=advance)
+    with telling(quiet) as tell, keeping_points(target):
+        report = sweep(replace(options, source=loaded, settings=None), target, tell, begin=begin)
     found = report.findings
     warn(*report.notes)
     warn(*found.warnings)

@@ -4,6 +4,7 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar
 
@@ -104,14 +105,17 @@ def _of_pipe(source: str) -> tuple[str, str]:
     return read_text(source, pipes=True)
 
 
-def result_path(output: Path | None, source: str, kind: str = "case", ending: str = ".h5") -> Path:
+def result_path(
+    output: str | PathLike[str] | None, source: object, kind: str = "case", ending: str = ".h5"
+) -> Path:
     """Where a result goes: to `output`, or into the current directory under the name of its source.
 
     Raises UsageError if that is the source itself; a result file may be replaced by the same run again.
     """
-    target = output or Path((kind if source == "-" else Path(source).stem) + ending)
-    if source != "-" and not is_result(source):
-        refuse_source(target, source, kind)
+    name = str(source)
+    target = Path(output or (kind if name == "-" else Path(name).stem) + ending)
+    if name != "-" and not is_result(name):
+        refuse_source(target, name, kind)
     suffix = led_to(target).suffix
     if suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
         raise UsageError(

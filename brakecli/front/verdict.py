@@ -9,7 +9,9 @@ from typing import Any
 
 from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 from brakecli.faces import argument
-from brakecli.front.measured import Measured
+from brakecli.front.given import chosen_of
+from brakecli.front.measured import look_at, quantity_of
+from brakecli.front.records import Classify
 
 _GONE = {
     "decayed_to": "what becomes of the motion is computed",
@@ -19,14 +21,15 @@ _GONE = {
 }
 
 
-def verdict_on(source: str, measured: Measured, thresholds: list[str] | None) -> dict[str, Any]:
-    """The verdict on one file, by the names of `--json`; thresholds are changed by NAME=VALUE."""
-    quantity = measured.quantity_of(source)
+def verdict_on(source: str, options: Classify) -> dict[str, Any]:
+    """The verdict on one file, by the names of `--json`."""
+    thresholds = chosen_of(options.thresholds, "thresholds")
+    quantity = quantity_of(options, source)
     if quantity is None:
         return _on_result(source, thresholds)
     from brakecli.analysis.signals.table import SignalThresholds
 
-    found = measured.look_at(source, changed(SignalThresholds, thresholds)).verdict
+    found = look_at(options, source, changed(SignalThresholds, thresholds)).verdict
     numbers = {**dataclasses.asdict(found), "bursts": [tone.numbers() for tone in found.bursts]}
     return {**numbers, "quantity": quantity}
 

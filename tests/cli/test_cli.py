@@ -296,6 +296,10 @@ def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
         assert f"brakecli {command}" in documentation, f"name `brakecli {command}` in the README or in docs/"
 
 
+def test_a_command_that_does_not_exist_is_told_with_the_nearest_one() -> None:
+    brakecli("runn", cwd=ROOT).told(2, "No such command 'runn'. Did you mean 'run'?")
+
+
 # how it is shown
 
 

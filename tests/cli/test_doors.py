@@ -189,7 +189,7 @@ def test_a_script_without_a_guard_computes_with_one_job_and_is_told_with_more(he
 def test_python_looks_for_the_cluster_that_the_environment_names(
     here: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def chosen(plan: object, jobs: object, scheduler: object, **more: object) -> None:
+    def chosen(plan: object, jobs: object, scheduler: object, *rest: object, **more: object) -> None:
         raise UsageError(f"of {scheduler}")
 
     monkeypatch.setenv("DASK_SCHEDULER_ADDRESS", "nowhere:1")

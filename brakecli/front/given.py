@@ -1,32 +1,33 @@
-"""What a caller in Python gives, as the command line has it: cases, studies, settings, axes, points, signals."""
+"""What options hold, in the shell as texts and in Python as objects, as what computes takes it."""
 
 import multiprocessing
 import os
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from datetime import date, time
 from itertools import pairwise
 from numbers import Real
 from os import PathLike
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any
 
-from brakecli.errors import UnreadableResultError, UsageError, found, value_text
+from brakecli.errors import UnreadableResultError, UsageError, found, printable, value_text
+from brakecli.faces import argument
 
 if TYPE_CHECKING:
     from brakecli.case.read import LoadedCase
-    from brakecli.front.measured import Measured
+    from brakecli.front.records import Changes, Keys, Source, Sweep
     from brakecli.scattering.study import LoadedStudy
     from brakecli.sweeps.listed import Listed
     from brakecli.sweeps.plan import LoadedSweep
     from brakecli.sweeps.tables import Axis
 
-    Source: TypeAlias = str | PathLike[str] | LoadedCase
-    Settings = Mapping[str, Any]
-
+MOST_VALUES = 10_000
+"""Values along which modes are followed."""
 _LARGEST_BITS = 1024  # of whole numbers: larger ones are no float, and have too many digits to be written
 
 
-def case_of(source: "Source | LoadedSweep", settings: "Settings | None") -> "LoadedCase":
+def case_of(source: "Source | LoadedSweep", settings: "Changes | None") -> "LoadedCase":
     """The case of a path, of a loaded case or of a result, with changed settings."""
     from brakecli.case.case import given_toml
     from brakecli.case.read import LoadedCase, parse_case, parse_resolved
@@ -51,7 +52,7 @@ def path_of(source: Any) -> str:
     return path
 
 
-def study_of(source: Any, settings: "Settings | None" = None) -> "LoadedStudy":
+def study_of(source: Any, settings: "Changes | None" = None) -> "LoadedStudy":
     """The study of a path, or one that was loaded, which takes no settings."""
     from brakecli.front.inputs import load_study
     from brakecli.scattering.study import LoadedStudy
@@ -72,18 +73,22 @@ def pushes_of(number: int) -> int:
     return number
 
 
-def overrides(settings: "Settings | None") -> list[str]:
+def overrides(settings: "Changes | None") -> list[str]:
     """Settings as `--set` has them; a table replaces the one that the case has."""
+    if isinstance(settings, list):
+        return settings
     return [f"{key}={_toml(value, key)}" for key, value in mapping(settings, "settings").items()]
 
 
-def axis_of(vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings]") -> "Axis":
+def axis_of(vary: "Mapping[Keys, Iterable[float] | Changes] | str") -> "Axis":
     """The axis along which modes are followed; raises UsageError where values neither rise nor fall."""
     import tomli_w
 
     from brakecli.case.read import parse_table
     from brakecli.sweeps.tables import Axis
 
+    if isinstance(vary, str):
+        return _axis_of_text(vary)
     if len(mapping(vary, "vary", several=True)) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
     [(keys, values)] = vary.items()
@@ -94,6 +99,23 @@ def axis_of(vary: "Mapping[str | tuple[str, ...], Iterable[float] | Settings]") 
     if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
         raise UsageError("vary: modes are followed along numbers that rise or fall; sort them, each once")
     return axis
+
+
+def _axis_of_text(text: str) -> "Axis":
+    """The axis of KEY,KEY=START:STOP:NUM, both ends included; raises UsageError."""
+    from brakecli.case.read import key_path
+    from brakecli.sweeps.tables import Axis
+
+    keys, _, numbers = text.partition("=")
+    with suppress(ValueError):  # pydantic's own is one, too
+        start, stop, count = numbers.split(":")
+        axis = Axis(parameter=tuple(keys.split(",")), start=float(start), stop=float(stop), num=int(count))
+        different = len({*map(key_path, axis.parameter)}) == len(axis.parameter)
+        if different and axis.size <= MOST_VALUES and (axis.size == 1 or axis.start != axis.stop):
+            return axis
+    what = f"is not KEY=START:STOP:NUM with two ends, NUM from 1 to {MOST_VALUES}, and no key twice"
+    remedy = "write, for instance, link2.angle_deg=1:10:10"
+    raise UsageError(f"{argument('vary')} {printable(text)}: {what}; {remedy}")
 
 
 def axes_of(axes: Any, direction: Any) -> list[dict[str, Any]]:
@@ -111,13 +133,20 @@ def axes_of(axes: Any, direction: Any) -> list[dict[str, Any]]:
     ]
 
 
-def ends_of(given: Any) -> tuple[float, float]:
-    """Both ends of a range; raises UsageError for anything else."""
+def ends_of(parameter: "Mapping[Keys, tuple[float, float]] | str") -> tuple[tuple[str, ...], float, float]:
+    """Keys that take the same value, and both ends of its range; raises UsageError."""
+    from brakecli.runs.branch import parsed
+
+    if isinstance(parameter, str):
+        return parsed(parameter)
+    if len(mapping(parameter, "parameter", several=True)) != 1:
+        raise UsageError("parameter: takes one key with both ends of its range, or one tuple of keys")
+    [(keys, ends)] = parameter.items()
     try:
-        low, high = map(float, given)
+        low, high = map(float, ends)
     except (TypeError, ValueError, OverflowError):
-        raise UsageError(f"parameter: is not both ends of a range{found(given)}; give two numbers") from None
-    return low, high
+        raise UsageError(f"parameter: is not both ends of a range{found(ends)}; give two numbers") from None
+    return parsed(f"{keys if isinstance(keys, str) else ','.join(keys)}={low!r}:{high!r}")
 
 
 def patterns_of(keys: Any) -> list[str]:
@@ -136,8 +165,10 @@ def margin_of(margin: Any) -> float:
     return float(number)
 
 
-def chosen_of(given: "Settings | None", name: str) -> list[str]:
+def chosen_of(given: "Changes | None", name: str) -> list[str]:
     """Values by name as options have them, as `KEY=VALUE`."""
+    if isinstance(given, list):
+        return given
     return [f"{key}={plain(value, f'{name}: {key}')}" for key, value in mapping(given, name).items()]
 
 
@@ -146,6 +177,32 @@ def text_of(given: Any, name: str) -> str:
     if not isinstance(given, str | None):
         raise UsageError(f"{name}: is no text{found(given)}; give one, or leave it out")
     return given or ""
+
+
+def sweep_of_options(options: "Sweep") -> "LoadedSweep":
+    """The sweep of a file, of what was loaded, or of axes, points and a search in Python."""
+    from brakecli.front.inputs import load_sweep
+    from brakecli.sweeps.listed import GIVEN
+    from brakecli.sweeps.plan import LoadedSweep, sweep_of
+
+    if options.axes is not None or options.points is not None or options.critical is not None:
+        listed = points_of(options.points)
+        tables = {
+            "case": "-",
+            "axis": axes_of(options.axes, options.direction),
+            "critical": mapping(options.critical, "critical"),
+        }
+        given = plain(tables, "sweep")
+        given |= {"points": GIVEN} if listed else {}
+        base = case_of(options.source, options.settings)
+        return sweep_of({name: each for name, each in given.items() if each}, base, listed)
+    if options.direction is not None:
+        raise UsageError("direction: is for axes; a sweep file states it in an axis of its own")
+    if not isinstance(options.source, LoadedSweep):
+        return load_sweep(path_of(options.source), overrides(options.settings))
+    if options.settings:
+        raise UsageError("settings: come too late for a sweep that was loaded; give them to brakecli.load")
+    return options.source
 
 
 def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
@@ -168,21 +225,6 @@ def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
         raise UsageError("points: need a value of each key at each point, and one point at least")
     refuse_many(len(columns), len(lists[0]), "points")
     return Listed.of([*columns], columns.values())
-
-
-def measured_of(
-    function: str, quantity: str | None, belt_speed: Any, stiffness: Any, reading: dict[str, Any]
-) -> "Measured":
-    """How a signal was measured, from the arguments of a function."""
-    from brakecli.front.measured import NUMBERS, Measured
-
-    how = ("column", "time_column", "sample_rate", "unit", "time_unit")
-    if unknown := sorted(reading.keys() - {*how}):
-        raise UsageError(f"{function}: there is no argument {unknown[0]}; give one of {', '.join(how)}")
-    given = {"quantity": quantity, "belt_speed": belt_speed, "stiffness": stiffness, **reading}
-    others = {name: plain(each, name) for name, each in given.items() if each is not None and name not in NUMBERS}
-    texts = {name: str(each) if isinstance(each, int) else text_of(each, name) for name, each in others.items()}
-    return Measured(**given | texts)
 
 
 def scheduler_of(given: Any) -> Any:
