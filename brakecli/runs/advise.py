@@ -33,6 +33,7 @@ _DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
 _ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
+_PRESSED_PART = 0.5  # of the load: where less presses the shoe on, the links carry more of it than the pad
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,11 @@ class AdviceReport:
     def notes(self) -> list[str]:
         """What the answer rests on."""
         rest = self.stability.equilibrium
+        load = abs(self.system.load_at_start)
         found = []
+        if rest is not None and rest.normal_force < _PRESSED_PART * load:
+            pressed = f"{rest.normal_force:.3g} N press the shoe on"
+            found.append(f"of the load of {load:g} N, {pressed}; the links carry the rest")
         if rest is not None and 0.0 < rest.contact_fraction < 1.0:
             instead = 'a sweep with method = "simulation" follows the motion itself'
             found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")

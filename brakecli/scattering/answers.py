@@ -23,6 +23,9 @@ class Indices:
     error: dict[str, float] = field(
         default_factory=dict
     )  # half of the 95 % interval of the total index, by resampling
+    together: dict[str, bool] = field(
+        default_factory=dict
+    )  # whether it also decides together with others: total less first-order index beyond the error of that
     note: str = ""  # why there are none
 
     @property
@@ -34,6 +37,20 @@ class Indices:
             for name in order
             if self.total[name] + self.error[name] >= self.total[order[0]] - self.error[order[0]]
         ]
+
+    @property
+    def sentence(self) -> str:
+        """Which parameters decide most, by how much, and whether together; empty where none is known."""
+        if not (first := self.first):
+            return ""
+        decide = "decides" if len(first) == 1 else "decide"
+        shares = listed([f"{self.total[name]:.0%}" for name in first])
+        found = f"{listed(first)} {decide} most on {self.of.replace('_', ' ')}, by {shares}"
+        joint = [name for name in first if self.together.get(name)]
+        if not joint:
+            return found
+        who = "" if len(first) == 1 else "each " if joint == first else f"{listed(joint)} "
+        return f"{found}, {who}together with the others"
 
     @classmethod
     def find(cls, of: str, names: tuple[str, ...], answers: Floats, seed: int) -> "Indices":
@@ -50,10 +67,12 @@ class Indices:
         first, total = _indices(answers)
         rng = np.random.default_rng([seed, len(names)])
         many = answers.shape[1]
-        again = [_indices(answers[:, rng.integers(many, size=many)])[1] for _ in range(_RESAMPLED)]
-        errors = stats.norm.ppf(0.5 + 0.5 * LEVEL) * np.std(again, axis=0)
+        again = np.array([_indices(answers[:, rng.integers(many, size=many)]) for _ in range(_RESAMPLED)])
+        half = stats.norm.ppf(0.5 + 0.5 * LEVEL)
+        errors = half * np.std(again[:, 1], axis=0)
+        together = total - first > half * np.std(again[:, 1] - again[:, 0], axis=0)
         named = [dict(zip(names, each.tolist(), strict=True)) for each in (first, total, errors)]
-        return cls(of, named[0], named[1], named[2])
+        return cls(of, named[0], named[1], named[2], dict(zip(names, together.tolist(), strict=True)))
 
 
 def _indices(answers: Floats) -> tuple[Floats, Floats]:
@@ -62,6 +81,12 @@ def _indices(answers: Floats) -> tuple[Floats, Floats]:
     mixed = answers[2:, None]
     found = stats.sobol_indices(func={"f_A": a, "f_B": b, "f_AB": mixed}, n=answers.shape[1])
     return np.ravel(found.first_order), np.ravel(found.total_order)
+
+
+def listed(words: list[str]) -> str:
+    """Words as a sentence lists them: a, b and c."""
+    *before, last = words
+    return f"{', '.join(before)} and {last}" if before else last
 
 
 def quantiles(values: Floats) -> list[float]:

@@ -92,11 +92,7 @@ class ScatterReport:
         found = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
         if self.failed:
             found += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
-        if first := self.indices.first:
-            named = _listed(first), _listed([f"{self.indices.total[name]:.0%}" for name in first])
-            decide, shared = ("decides", "") if len(first) == 1 else ("decide", ", each together with the others")
-            found += f"; {named[0]} {decide} most on {self.indices.of.replace('_', ' ')}, by {named[1]}{shared}"
-        return found
+        return "; ".join(filter(None, (found, self.indices.sentence)))
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
@@ -111,12 +107,6 @@ class Drawing:
     others: Floats | None  # the same of the indices
     sweep: LoadedSweep  # of the samples, and behind them of the indices, if those are asked for the same
     by_eigenvalues: LoadedSweep | None  # of the indices, if those are asked for eigenvalues beside runs
-
-
-def _listed(words: list[str]) -> str:
-    """Words as a sentence lists them: a, b and c."""
-    *before, last = words
-    return f"{', '.join(before)} and {last}" if before else last
 
 
 def draw(loaded: LoadedStudy) -> Drawing:

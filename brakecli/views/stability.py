@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from brakecli.runs.advise import AdviceReport
 
 SHORT_ADVICE = 3
-"""Keys to change that are shown unless all are asked for."""
+"""Keys to change, and notes, that are shown unless all are asked for."""
 _MOVES = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %"
 _STATE = {True: "stable", False: "unstable", None: "-"}
 _MODES = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
@@ -172,14 +172,16 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
         blocks.append(Row("can vibrate from", show.text(report.thresholds.coexists_from)))
     if report.thresholds.barrier is not None:
         blocks.append(Row("barrier", show.text(report.thresholds.barrier, "m")))
-    blocks += [Row("note", each) for each in report.notes()]
+    notes = report.notes()
+    blocks += [Row("note", each) for each in notes]
     if check:
         ran = f"{check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
         blocks += details(Row("checked by a run", f"{ran}: {check.verdict.regime}"))
         blocks += details(Row("why", "; ".join(check.verdict.reasons)))
     if report.advice:
         advice = _advice(report.advice, report.squeal is not None)
-        blocks.append(Table(advice, report.ranking, first=SHORT_ADVICE))
+        first = max(SHORT_ADVICE - len(notes), 1)  # a short answer has twelve lines, and a note takes one of them
+        blocks.append(Table(advice, report.ranking, first=first))
     if moves := _moves(report):
         blocks.append(Table(moves, _MOVES, first=0))
     return View(report.title, [sentence(report.conclusion())], blocks)

@@ -23,6 +23,7 @@ from tests.examples import MODE_COUPLING, NEVER_STABLE, ROUGH, SQUEAL, make
 mpmath = import_module("mpmath")  # imported so because it has no type hints
 
 Tables = dict[str, Any]
+PRESSED = "of the load of 5000 N, 830 N press the shoe on; the links carry the rest"
 ENDS = {"mass": "shoe.mass", "c_1": "link1.stiffness", "c_2": "link2.stiffness"}
 ENDS |= {"beta": "link1.angle_deg", "alpha": "link2.angle_deg", "k": "contact.stiffness"}
 
@@ -299,18 +300,36 @@ def test_a_case_above_a_range_of_instability_is_told_so() -> None:
 def test_what_the_answer_rests_on_is_told() -> None:
     report = advice_on(make(SQUEAL, friction__coefficient=0.3))
     assert report.stability.equilibrium is not None
-    assert report.notes() == []
+    assert report.notes() == [PRESSED]
     opens = replace(report.stability, equilibrium=replace(report.stability.equilibrium, contact_fraction=0.7))
-    assert "mean stiffness of the contact" in replace(report, stability=opens).notes()[0]
+    assert "mean stiffness of the contact" in replace(report, stability=opens).notes()[1]
     stops = {"wheel__angular_speed": None, "wheel__times": [0.0, 1.0], "wheel__angular_speeds": [0.2, 0.0]}
     other = advice_on(make(SQUEAL, friction__coefficient=0.3, link1__damping=0.0, link2__damping=0.0, **stops))
     assert [note.split(":")[0] for note in other.notes()] == [
+        PRESSED,
         "no dashpot acts",
         "speed and load are those of t = 0",
     ]
     by_key = {each.parameter: each for each in other.sensitivities}
     assert by_key["wheel.angular_speeds"].value == (0.2, 0.0)
     assert by_key["wheel.angular_speeds"].elasticity == 0.0
+
+
+@pytest.mark.parametrize("stiffness", [2e7, 9e7, 1.1e8, 1e9])
+def test_a_load_that_the_links_carry_is_told_where_they_carry_more_of_it_than_the_pad(stiffness: float) -> None:
+    """Steady sliding of two links and a pad that touches everywhere, two linear equations in x and y."""
+    case = make(SQUEAL, contact__stiffness=stiffness)
+    angle = math.radians(5.0)
+    pad = 2.0 * 0.05 * stiffness
+    across = -1.2e7 * math.sin(angle) * math.cos(angle)
+    rows = [
+        [1.2e7 * math.cos(angle) ** 2, across + 0.6 * pad],
+        [across, 1e7 + 1.2e7 * math.sin(angle) ** 2 + pad],
+    ]
+    force = -pad * float(np.linalg.solve(rows, [0.0, -5000.0])[1])
+    told = f"of the load of 5000 N, {force:.3g} N press the shoe on; the links carry the rest"
+    report = advise(LoadedCase(case, "", "a test"), ["shoe.mass"], 0.2, lambda what, done, total: None, most=-1.0)
+    assert (told in report.notes()) is (force < 2500.0)
 
 
 @campaign

@@ -51,7 +51,8 @@ def test_json_has_the_names_of_the_page_and_the_advised_value_keeps_its_promise(
 def test_what_takes_long_is_left_out_where_no_more_is_wanted_and_the_run_that_checks_is_short() -> None:
     loaded = parse_case(*read_text(CASES["relaxation"]), ["solver={duration=1e7}"])
     less = advise(loaded, KEYS, 0.2, lambda what, done, total: None, most=-1.0)
-    assert less.notes() == ["what to change is left out, as it takes long here: `brakecli advise` asks it"]
+    left_out = "what to change is left out, as it takes long here: `brakecli advise` asks it"
+    assert less.notes() == ["of the load of 5000 N, 825 N press the shoe on; the links carry the rest", left_out]
     assert (less.sensitivities, less.advice, less.check) == ([], [], None)
     assert less.critical_friction == pytest.approx(0.5753762, abs=1e-7)
     check = advise(loaded, ["shoe.mass"], 0.2, lambda what, done, total: None).check
@@ -74,7 +75,8 @@ def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: 
     assert "\nchecked by a run   link2.angle_deg = 7.692, " in table
     short = terminal_text(of_advice(report, TERMINAL)).splitlines()
     assert len(short) <= 12
-    assert short[-5].endswith("(3 of 9; all: --details):")
+    assert "note  of the load of 5000 N, 825 N press the shoe on; the links carry the rest" in short
+    assert short[-4].endswith("(2 of 9; all: --details):")
 
 
 def test_wrong_options_are_told(tmp_path: Path) -> None:

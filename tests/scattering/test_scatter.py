@@ -176,6 +176,29 @@ def test_parameters_that_errors_do_not_tell_apart_decide_together() -> None:
     assert Indices("squeal").first == []
 
 
+def test_others_are_named_where_the_joint_part_is_beyond_its_error() -> None:
+    """A sum has no joint part; of a product it is all of each index; of x1 (1 + x2) half of the total of x1.
+
+    Of normal x, with deviations 1, the variances of the latter's parts are 1 (x1 alone) and 1 (both together).
+    """
+    study = study_of(NORMAL, NORMAL, samples=4096, seed=2)
+    x = for_indices(study)
+    first = study.names[0]
+
+    def said(answers: Any) -> str:
+        return Indices.find("squeal", study.names, answers, 0).sentence
+
+    assert said(x[..., 0] + x[..., 1]).endswith("decide most on squeal, by 50% and 50%")
+    assert said(x[..., 0] * x[..., 1]).endswith(", each together with the others")
+    assert said(x[..., 0] * (1.0 + x[..., 1])).startswith(f"{first} decides most on squeal, by 1")
+    assert said(x[..., 0] * (1.0 + x[..., 1])).endswith("%, together with the others")
+    assert "together" not in said(2.0 * x[..., 0] + x[..., 1])
+    parts = {"a": 0.5, "b": 0.49}
+    near = Indices("squeal", parts, parts, dict.fromkeys(parts, 0.02), {"a": False, "b": True})
+    assert near.sentence == "a and b decide most on squeal, by 50% and 49%, b together with the others"
+    assert Indices("squeal").sentence == ""
+
+
 @pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "random"])
 @pytest.mark.parametrize("margin", [0.5, 2.0])
 @pytest.mark.parametrize("replications", counts(60, 400))
