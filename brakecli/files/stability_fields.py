@@ -206,6 +206,7 @@ _LEFT = (
     ratio(
         "squeal_probability",
         "part of such brakes that squeal where stiffnesses and friction scatter by 10 %, or keys as in a study",
+        label="squeal under a scatter",
     ),
     ratio("squeal_lower", "lower end of its 95 % interval"),
     ratio("squeal_upper", "upper end"),

@@ -14,6 +14,7 @@ from PIL import Image
 
 from brakecli.files.field import Field
 from brakecli.plots import style
+from brakecli.runs.advise import AdviceReport
 from brakecli.sweeps.result import unit
 from brakecli.views.render import Renderer
 from brakecli.views.view import Row, View, sentences
@@ -89,6 +90,7 @@ class Part:
     sections: Callable[[], Sequence[Section]]
     numbers: Numbers
     versions: Mapping[str, str] = field(default_factory=dict)
+    advice: AdviceReport | None = None  # of a run
 
 
 @dataclass(frozen=True)
@@ -96,6 +98,7 @@ class Beside:
     """Results beside each other, named by what differs: a picture of all together, or one of each."""
 
     title: str
+    best: str  # a sentence; empty where nothing tells one from the other
     names: Sequence[str]
     titles: Sequence[str]  # of their own pages
     changed: Sequence[Any]  # blocks

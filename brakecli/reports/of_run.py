@@ -79,12 +79,12 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     answer = [motion_sentence(stored_numbers(result), PAGE, full=True), theory]
     name = escaped(result.path.name)
     title = loaded.case.title or "Case without a title"
-    numbers = numbers_of(named(fields.VERDICT, *_MAIN), found)
-    numbers = {**numbers, **numbers_of(named(ADVICE, "critical_friction", "margin"), advice.numbers())}
+    of_theory = numbers_of(named(ADVICE, "critical_friction", "margin", "squeal_probability"), advice.numbers())
+    numbers = {**of_theory, **numbers_of(named(fields.VERDICT, *_MAIN), found)}
     drawn = picture(PICTURE, partial(draw, result))
     change = [*_to_change(advice, found.get("regime"))]
     sections = partial(_appendix, result, loaded, advice)
-    return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions)
+    return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions, advice)
 
 
 def _appendix(result: StoredResult, loaded: LoadedCase, advice: AdviceReport) -> list[Section]:

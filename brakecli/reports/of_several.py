@@ -1,7 +1,8 @@
 """Two or three results of one kind beside each other: what was changed, and what became of it."""
 
+import math
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -10,6 +11,9 @@ from brakecli.files.contents import keys
 from brakecli.files.read import StoredResult
 from brakecli.plots import over_each_other
 from brakecli.reports.blocks import Beside, Part, Table, Texts, key_unit, percent, picture, rounded, shown
+from brakecli.runs.advise import AdviceReport
+from brakecli.scattering.answers import listed
+from brakecli.views.view import sentence
 
 PICTURE = "All results in one picture: the first one wide, the second one dashed"
 THIRD = ", the third one dotted"
@@ -80,7 +84,45 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         numbers = [row for row in numbers if len({*map(str, row[1:-1])}) > 1][:_MOST_NUMBERS]
     if chosen:
         blocks.append(Texts([f"Not given as numbers in the files, and different, too: {', '.join(chosen)}."]))
-    return Beside(title, names, titles, blocks, _table(numbers, head), pictures)
+    advice = [each.advice for each in parts if each.advice]
+    best = best_of(dict(zip(letters, advice, strict=True))) if len(advice) == len(parts) else ""
+    return Beside(title, best, names, titles, blocks, _table(numbers, head), pictures)
+
+
+def best_of(designs: Mapping[str, AdviceReport]) -> str:
+    """Which designs are best against squeal, and by what; empty where one of them does not slide.
+
+    Those whose critical friction is largest, over their own, and of which fewest squeal under a scatter. Margins
+    are told apart by their first digits, as numbers of a page are, and shares where their 95 % intervals do not
+    meet.
+    """
+    if any(each.stability.equilibrium is None or not each.stability.belt_speed for each in designs.values()):
+        return ""
+    times = {name: _times(each) for name, each in designs.items()}
+    far = [name for name, each in times.items() if each == max(times.values())]
+    finite = [f"{each:.4g} for {name}" for name, each in times.items() if math.isfinite(each)]
+    by = [f"critical friction over own friction is {listed(finite)}"] if finite else []
+    by += [f"no friction makes {name} squeal" for name, each in times.items() if math.isinf(each)]
+    seldom = [*designs]
+    left = {name: each.squeal for name, each in designs.items() if each.squeal}
+    if len(left) == len(designs):
+        least = min(left.values())
+        seldom = [name for name, each in left.items() if each.squeal_lower <= least.squeal_upper]
+        shares = listed([f"{100.0 * each.squeal_probability:.2g} % of {name}" for name, each in left.items()])
+        by.append(f"under a scatter {next(iter(designs.values())).scatter} {shares} squeal")
+    both = [name for name in far if name in seldom]
+    better, larger, fewer = ("better", "larger", "fewer") if len(designs) == 2 else ("best", "largest", "fewest")
+    said = f"the {larger} margin is that of {listed(far)}, but {fewer} squeal of {listed(seldom)}"
+    if len(both) == len(designs):
+        said = f"{listed(both)} do not differ in what decides on squeal"
+    elif both:
+        said = f"{listed(both)} {'is' if len(both) == 1 else 'are'} {better} against squeal"
+    return sentence(f"{said}: {'; '.join(by)}")
+
+
+def _times(advice: AdviceReport) -> float:
+    """Critical friction over a design's own; infinite where no friction makes it unstable, or none acts."""
+    return math.inf if advice.margin is None else float(f"{1.0 + advice.margin:.{DIGITS}g}")
 
 
 def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:

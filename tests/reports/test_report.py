@@ -5,6 +5,7 @@ import json
 import re
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from html.parser import HTMLParser
 from io import BytesIO
 from itertools import pairwise, product
@@ -18,7 +19,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 
 import brakecli
-from brakecli.analysis.stability.advice import KEYS
+from brakecli.analysis.stability.advice import KEYS, Left
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
@@ -28,9 +29,11 @@ from brakecli.files.write import new_result
 from brakecli.plots import style
 from brakecli.plots.branch import draw
 from brakecli.reports import blocks, of_run, of_several, of_sweep, page, sweep_map
+from brakecli.reports.of_several import best_of
 from brakecli.reports.page import write_report
-from brakecli.runs.advise import advise
+from brakecli.runs.advise import AdviceReport, advise
 from brakecli.runs.run import run
+from brakecli.scattering.advised import squealing
 from brakecli.sweeps.lock_in import lock_in
 from brakecli.sweeps.lock_in import write as write_lock_in
 from brakecli.sweeps.tables import Axis
@@ -284,13 +287,51 @@ def test_three_results_stand_side_by_side_with_their_changes_against_the_first(
     assert heads == [f"{letter}: {name}.h5, friction.coefficient = {number:g}" for letter, name, number in numbers]
     assert short.html.count('<section class="answer">') == 3
     assert short.html.count("<figure>") == 1  # of all together
+    assert "<p>B is best against squeal: critical friction over own friction is " in short.html
     told = {cells[0]: (marked, cells[1:]) for marked, cells in rows(short.html)}
     assert told[""] == (False, ["A", "B", "C", "B against A", "C against A"])
     assert told["friction.coefficient"] == (True, ["0.6", "0.3", "0.75", "−50 %", "+25 %"])  # 0.75 / 0.6 - 1
+    for squeal, friction in zip(told["squeal under a scatter"][1], (0.6, 0.3, 0.75), strict=False):
+        hits = squealing(parse_case(TINY, "case", [f"friction.coefficient={friction}"]).case)
+        assert hits is not None
+        assert float(squeal) == pytest.approx(hits.mean(), rel=1e-3)
     assert all(len({*cells[:3]}) > 1 for name, (_, cells) in told.items() if name)  # what is the same is no news
     long = reported(*(tmp_path / f"{name}.h5" for name in "abc"))
     assert len(long.named("article")) == 4
     assert (False, ["lost contact", "0", "0", "0", "same", "same"]) in rows(long.html)
+
+
+def test_the_better_design_is_named_by_its_margin_and_by_its_squeal_under_a_scatter() -> None:
+    """Critical frictions from the closed form of `stability`; shares, and their intervals, are made up."""
+
+    def design(squeal: Left | None, *changes: str) -> AdviceReport:
+        loaded = parse_case(TINY, "case", changes)
+        return replace(advise(loaded, KEYS, 0.2, quiet, most=-1.0), squeal=squeal, scatter="of ±10 %")
+
+    critical = stability(system_of(parse_case(TINY, "case").case)).critical
+    assert critical is not None
+    low, high = (f"{critical.friction / own:.4g}" for own in (0.6, 0.5))
+    often = Left(0.3, 0.28, 0.32)
+    near = Left(0.31, 0.29, 0.33)
+    seldom = Left(0.1, 0.08, 0.12)
+    less = "friction.coefficient=0.5"
+    margins = f"critical friction over own friction is {low} for A and {high} for B"
+    assert best_of({"A": design(often), "B": design(seldom, less)}) == (
+        f"B is better against squeal: {margins}; under a scatter of ±10 % 30 % of A and 10 % of B squeal."
+    )
+    assert best_of({"A": design(often), "B": design(near, less)}).startswith("B is better against squeal: ")
+    assert best_of({"A": design(often), "B": design(near)}).startswith(
+        "A and B do not differ in what decides on squeal: "
+    )
+    assert best_of({"A": design(seldom), "B": design(often, less)}).startswith(
+        f"The larger margin is that of B, but fewer squeal of A: {margins}; "
+    )
+    without = design(None, "friction.coefficient=0.0")
+    said = best_of({"A": design(often), "B": without})
+    assert said.endswith(f"critical friction over own friction is {low} for A; no friction makes B squeal.")
+    three = {"A": design(often), "B": design(seldom, less), "C": design(seldom, less)}
+    assert best_of(three).startswith("B and C are best against squeal: ")
+    assert best_of({"A": design(often), "B": design(None, "wheel.angular_speed=0.0")}) == ""
 
 
 def test_many_changed_keys_are_named_where_a_single_page_has_no_room_for_them(tmp_path: Path, plain: None) -> None:
