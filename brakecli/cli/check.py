@@ -8,7 +8,7 @@ from typing import Annotated
 
 from brakecli.cli.options import AsJson, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.front.given import case_of, overrides
+from brakecli.front.given import case_of, overrides, study_of
 from brakecli.front.inputs import kind_of_file, load_sweep
 from brakecli.front.options import Description
 from brakecli.front.records import Settings
@@ -20,14 +20,18 @@ OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_
 class Check:
     """Options of `check`."""
 
-    file: Annotated[str, Description('Case or sweep file, or "-" for standard input.', "FILE.toml", by_place=True)]
+    file: Annotated[str, Description('Case, sweep or study, or "-" for standard input.', "FILE.toml", by_place=True)]
     settings: Settings = None
 
 
 @with_options
 def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> None:
-    """Validate a case or a sweep; what it takes, its limits."""
-    if kind_of_file(options.file) == "sweep":
+    """Validate a case, sweep or study; what it takes, its limits."""
+    kind = kind_of_file(options.file)
+    if kind == "study":
+        _check_study(options, as_json=as_json, quiet=quiet)
+        return
+    if kind == "sweep":
         sweep = load_sweep(options.file, overrides(options.settings))
         from brakecli.runs.limits import free_bytes
         from brakecli.sweeps.driver import crew
@@ -56,3 +60,28 @@ def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> No
     show_result("check", numbers, partial(of_check, found, loaded.case.title), as_json=as_json, quiet=quiet)
     warn(*found.warnings)
     refuse(found, free_bytes(Path()))
+
+
+def _check_study(options: Check, *, as_json: bool, quiet: bool) -> None:
+    loaded = study_of(options.file, options.settings)
+    from brakecli.runs.limits import free_bytes
+    from brakecli.scattering.scatter import draw, size_of_study
+    from brakecli.sweeps.size import refuse_sweep
+    from brakecli.views.file import of_study_size
+
+    study = loaded.study
+    drawing = draw(loaded)
+    size = size_of_study(loaded, drawing)
+    counts = {"samples": drawing.samples, "index_samples": drawing.index_samples}
+    asked = {"method": study.method, "indices_of": study.indices_of}
+    numbers = {
+        "valid": True,
+        **counts,
+        "keys": [path for each in study.parameter for path in each.paths],
+        **asked,
+        **vars(size),
+    }
+    view = partial(of_study_size, study, counts, size, loaded.title)
+    show_result("check", numbers, lambda show: view(), as_json=as_json, quiet=quiet)
+    warn(*loaded.beside(loaded.base.case), *size.refused, *size.implausible)
+    refuse_sweep(size, free_bytes(Path()))

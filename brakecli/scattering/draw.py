@@ -9,10 +9,13 @@ from brakecli.solver.arrays import Floats
 
 _LEAST = 2.0**-53  # a probability: a normal value has no end
 _MOST_FOR_INDICES = 1 << 12  # samples of each of the two sets that indices compare
+SAMPLE_BYTES = 450.0
+VALUE_BYTES = 50.0
+"""Memory that a sample takes, and a value of one, about."""
 MOST_SAMPLES = 1_000_000
-"""Samples of a study, a choice: a sample takes some 450 bytes, and so many know a probability to a thousandth."""
+"""Samples of a study, a choice: so many know a probability to a thousandth."""
 MOST_VALUES = 20_000_000
-"""Values of all samples, those of the indices included; a choice, as one takes some 50 bytes."""
+"""Values of all samples, those of the indices included; a choice."""
 
 
 def drawn(study: Study) -> Floats:

@@ -18,24 +18,27 @@ from brakecli.errors import CaseError, Problem
 from brakecli.files import stability_fields as fields
 from brakecli.files.field import Field, values_of
 from brakecli.files.write import ResultFile, new_result
+from brakecli.runs.limits import FILE_BYTES
+from brakecli.runs.plausible import implausible
 from brakecli.runs.run import origin
 from brakecli.scattering.answers import Indices, quantiles
-from brakecli.scattering.draw import drawn, for_indices, has_indices
+from brakecli.scattering.draw import SAMPLE_BYTES, VALUE_BYTES, drawn, for_indices, has_indices
 from brakecli.scattering.eigen import ask, asking
 from brakecli.scattering.study import SCRAMBLINGS, LoadedStudy, Study
 from brakecli.solver.arrays import Floats
 from brakecli.solver.integrate import Counted
-from brakecli.sweeps.driver import choose_engine, sweep
+from brakecli.sweeps.driver import choose_engine, crew, sweep
 from brakecli.sweeps.journal import Journal
 from brakecli.sweeps.listed import GIVEN, Listed
 from brakecli.sweeps.plan import LoadedSweep, Plan, sweep_of
 from brakecli.sweeps.result import SweepReport, unit
-from brakecli.sweeps.size import WORKER_WORK
+from brakecli.sweeps.size import WORKER_BYTES, WORKER_WORK, Size, size_of
 from brakecli.sweeps.workers.task import Compute, Engine
 
 _SMOOTH_WORK = 4e-4
 _ROUGH_WORK = 0.1
 """What the eigenvalues of a sample take, about."""
+_COLUMNS = 6  # of eight bytes that a file has beside its parameters
 _CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
 
 
@@ -107,6 +110,16 @@ class Drawing:
     others: Floats | None  # the same of the indices
     sweep: LoadedSweep  # of the samples, and behind them of the indices, if those are asked for the same
     by_eigenvalues: LoadedSweep | None  # of the indices, if those are asked for eigenvalues beside runs
+
+    @property
+    def samples(self) -> int:
+        """How many samples there are."""
+        return math.prod(self.values.shape[:2])
+
+    @property
+    def index_samples(self) -> int:
+        """How many more there are of the indices."""
+        return 0 if self.others is None else math.prod(self.others.shape[:2])
 
 
 def draw(loaded: LoadedStudy) -> Drawing:
@@ -200,12 +213,33 @@ def engine_for(
     compute: Compute | None = None,
 ) -> Engine:
     """The engine for the samples of a plan: this process where workers would take as long to start."""
-    each = _SMOOTH_WORK if system_of(plan.case({})).smooth else _ROUGH_WORK
-    few = compute is not None and plan.points * each < WORKER_WORK
+    few = compute is not None and _few(plan)
     if few and jobs is None and scheduler is None and scheduler_file is None:
         jobs = 1
         in_caller = True
     return choose_engine(plan, jobs, scheduler, scheduler_file, in_caller=in_caller, compute=compute)
+
+
+def _few(plan: Plan) -> bool:
+    """Whether the eigenvalues of all samples take less time than workers take to start."""
+    return plan.points * (_SMOOTH_WORK if system_of(plan.case({})).smooth else _ROUGH_WORK) < WORKER_WORK
+
+
+def size_of_study(loaded: LoadedStudy, drawing: Drawing) -> Size:
+    """What a study will take; none of its samples is computed."""
+    plan = drawing.sweep.plan
+    if loaded.study.method == "run":
+        return size_of(plan, crew(plan), spare=True)
+    samples = drawing.samples
+    keys = sum(len(each.paths) for each in loaded.study.parameter)
+    workers = 0 if _few(plan) else crew(plan)
+    return Size(
+        points=plan.points,
+        workers=workers,
+        memory=WORKER_BYTES * (workers + 1) + SAMPLE_BYTES * samples + VALUE_BYTES * plan.points * keys,
+        file_size=FILE_BYTES + 8.0 * samples * (len(loaded.study.parameter) + _COLUMNS),
+        implausible=tuple(implausible(system_of(loaded.base.case))),
+    )
 
 
 def _report(

@@ -24,7 +24,7 @@ _EARLY = 3e-3
 _SEARCH = 0.1
 _SEARCH_RUNS = 12.0  # of a search by simulation, for the least sustained value
 # Bytes, measured with `make bench-sweep`.
-_WORKER_BYTES = 1.8e8
+WORKER_BYTES = 1.8e8
 _SAMPLE_BYTES = 8.0 * 24
 _RECORD_BYTES = 150.0  # of a point in the journal, and in the result
 # in the parent, which writes lines that are followed all at once
@@ -89,7 +89,7 @@ def size_of(plan: Plan, workers: int, *, spare: bool = False) -> Size:
     return Size(
         points=records,
         workers=workers,
-        memory=(_WORKER_BYTES + tables) * (workers + 1) + held + in_parent * records,
+        memory=(WORKER_BYTES + tables) * (workers + 1) + held + in_parent * records,
         file_size=_RECORD_BYTES * records + FILE_BYTES,
         together=together,
         refused=tuple(failing),

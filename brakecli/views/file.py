@@ -12,6 +12,7 @@ from brakecli.views.view import Row, Table, View, sentence
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
     from brakecli.runs.limits import Check
+    from brakecli.scattering.study import Study
     from brakecli.sweeps.size import Size
 
 _ASIDE = ("title", "regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
@@ -59,8 +60,29 @@ def of_check(found: Check, title: str, show: Renderer) -> View:
 
 def of_size(found: Size, title: str) -> View:
     """What a sweep would take."""
-    workers = str(found.workers or "none, as they would take longer to start")
-    return View(title, blocks=[Row("points", str(found.points)), Row("workers", workers), *_bytes(found)])
+    return View(title, blocks=[Row("points", str(found.points)), *_workers(found), *_bytes(found)])
+
+
+def of_study_size(study: Study, counts: Mapping[str, int], found: Size, title: str) -> View:
+    """What a study would take; `counts` are its samples and those of its indices."""
+    laws = [f"{' and '.join(each.paths)} ({each.distribution})" for each in study.parameter]
+    each = "growth and frequency of its least stable mode, and its critical friction, by eigenvalues"
+    if study.method == "run":
+        each = "a run with its verdict, and its critical friction by eigenvalues"
+    more = counts["index_samples"]
+    indices = f"on {study.indices_of.replace('_', ' ')}, by {more} samples more" if more else "not asked"
+    rows = [
+        Row("samples", str(counts["samples"])),
+        Row("scatters", ", ".join(laws)),
+        Row("of each sample", each),
+        Row("squeal", "at {:g} to {:g} Hz".format(*study.band) if study.band else "at any frequency"),
+        Row("what decides", indices),
+    ]
+    return View(title, blocks=[*rows, *_workers(found), *_bytes(found)])
+
+
+def _workers(found: Size) -> list[Row]:
+    return [Row("workers", str(found.workers or "none, as they would take longer to start"))]
 
 
 def _bytes(found: Check | Size) -> list[Row]:

@@ -296,6 +296,35 @@ def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
     assert "What decides on critical friction" in shown
 
 
+def test_check_says_what_a_study_takes_and_computes_nothing(tmp_path: Path) -> None:
+    """Samples as those of the study itself; its file within a factor of three, as its head is the most of it."""
+    write_study(tmp_path, FRICTION, DAMPING, "samples = 60", "band = [100.0, 300.0]")
+    shown, told = (command("check", "study.toml", *more, cwd=tmp_path) for more in ((), ("--json",)))
+    assert left_in(tmp_path) == {"shoe.toml", "study.toml"}
+    numbers = told.json
+    for words in (
+        "friction.coefficient (uniform), link1.damping and link2.damping (triangular)",
+        "growth and frequency of its least stable mode, and its critical friction, by eigenvalues",
+        "at 100 to 300 Hz",
+        "on critical friction, by 128 samples more",  # sets A, B, and one for each parameter, of 32 samples
+        "none, as they would take longer to start",
+    ):
+        assert words in " ".join(shown.out.split())
+    assert numbers["valid"] is True
+    assert numbers["keys"] == ["friction.coefficient", "link1.damping", "link2.damping"]
+    assert (numbers["samples"], numbers["index_samples"], numbers["points"]) == (64, 128, 192)
+    report = brakecli.scatter(tmp_path / "study.toml", output=tmp_path / "study.h5")
+    assert report.attrs["samples"] == numbers["samples"]
+    assert numbers["file_size"] / 3.0 < (tmp_path / "study.h5").stat().st_size < 3.0 * numbers["file_size"]
+    run = ["--set", 'method="run"', "--set", 'indices_of="none"', "--set", "friction.coefficient=0.9"]
+    other = command("check", "study.toml", *run, "--json", cwd=tmp_path)
+    assert (other.json["method"], other.json["index_samples"], other.json["points"]) == ("run", 0, 64)
+    assert "the case has 0.9, but the study scatters it between 0.3 and 0.8" in other.told(0)
+    assert "not asked" in command("check", "study.toml", *run, cwd=tmp_path).out
+    write_study(tmp_path, FRICTION.replace("0.8", "0.2"))
+    command("check", "study.toml", cwd=tmp_path).told(2, "study.toml:6: parameter[0].high: is not above low")
+
+
 @campaign
 def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> None:
     assert "run it with: brakecli scatter scatter.toml" in command("new", "scatter", cwd=tmp_path).out
