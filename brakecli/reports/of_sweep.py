@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from brakecli.analysis.regime.decision import Regime
-from brakecli.case.read import parse_table
+from brakecli.case.read import parse_case, parse_table
 from brakecli.errors import CaseError, UsageError, escaped
 from brakecli.files import fields
 from brakecli.files.numbers import stored_numbers
 from brakecli.files.read import StoredResult
 from brakecli.files.stability_fields import BRANCH, LOCK_IN, PROBABLE, SCATTER
+from brakecli.files.toml_lines import Located
 from brakecli.plots import style
 from brakecli.plots.gather import gather, numeric
 from brakecli.plots.result import draw
@@ -37,6 +38,7 @@ from brakecli.reports.blocks import (
 )
 from brakecli.reports.of_run import case_blocks, repeat
 from brakecli.reports.sweep_map import MOST, maps
+from brakecli.sweeps.listed import GIVEN
 from brakecli.sweeps.record import Status
 from brakecli.views.points import of_comparison, regimes_sentence
 from brakecli.views.stability import of_branch, of_lock_in, of_scatter
@@ -67,6 +69,7 @@ _PICTURES = {
     "branch": "Amplitude and frequency of all motions along the key; stable ones full, unstable ones dashed",
     "scatter": "Probabilities with their intervals, what decides on them, and how numbers are distributed",
 }
+_STANDS_FOR = {"CASE.toml": "the case", "SWEEP.toml": "the sweep", "STUDY.toml": "the study"}
 _ADVISE = dict.fromkeys(("sweep", "stability", "branch"), "brakecli advise CASE.toml")
 _ADVISE["scatter"] = "brakecli advise CASE.toml --scatter STUDY.toml"
 
@@ -255,15 +258,46 @@ def _plain(
         given = str(
             attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", "")
         )
-        again = repeat(result, f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5", given)
-        if "CASE" in _COMMANDS[kind]:
-            again.append(Texts(["CASE.toml holds the whole case, which stands above as a file."]))
+        line = f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5"
+        again = repeat(result, line, given)
+        over = f"; its case is {case_file or 'the one above'}"
+        shown = "a whole" if "CASE" in line else f"it was given{over}"
+        again.append(Texts([f"{_stands_for(line)}, which is above as {shown}."]))
         case = Section("Case", case_blocks(case_of(result)))
         return [*sections(), case, Section("How to repeat it", again)]
 
+    case_file = _case_file(result)
     title = str(attributes.get("title", "")) or "Result without a title"
     name = escaped(result.path.name)
     asks = question or _QUESTIONS[kind]
     what = "This names the keys of such a case to change, and to which values:"
-    change = [Texts([what]), Code(_ADVISE[kind])] if kind in _ADVISE else []
+    change = list[Any]()
+    if kind in _ADVISE:
+        advise = _ADVISE[kind].replace("CASE.toml", case_file or "CASE.toml")
+        change = [Texts([what]), Code(advise)]
+        if unknown := _stands_for(advise):
+            change.append(Texts([f"{unknown}: a page with --full has the text to copy."]))
     return Part(name, title, asks, answer, drawn, change, every, numbers, result.versions)
+
+
+def _stands_for(line: str) -> str:
+    """What names of files in a command stand for that no file has; empty where there are none."""
+    words = line.split()
+    return " and ".join(
+        f"{name} stands for the file of {what}" for name, what in _STANDS_FOR.items() if name in words
+    )
+
+
+def _case_file(result: StoredResult) -> str:
+    """The case file of a sweep or a study, as a command names it; empty where it is not known to hold the case.
+
+    Settings of the command line may have changed the case since.
+    """
+    attributes = result.attributes
+    table = str(attributes.get("resolved_sweep_toml") or attributes.get("resolved_study_toml") or "")
+    try:
+        name = str(Located(table).data.get("case", GIVEN))
+        same = parse_case(result.text("case_toml"), name).resolved == result.text("resolved_toml")
+    except CaseError:
+        return ""
+    return escaped(shlex.quote(name)) if same and name != GIVEN else ""

@@ -455,6 +455,10 @@ def test_branches_have_a_sentence_a_picture_and_their_special_points(
     critical = stability(system_of(parse_case(TINY, "case").case)).critical
     assert critical is not None
     assert "brakecli branch CASE.toml --parameter friction.coefficient=0.5:0.8 -o again.h5" in page.html
+    assert (
+        "<p>CASE.toml stands for the file of the case: a page with --full has the text to copy.</p>" in page.html
+    )
+    assert "<p>CASE.toml stands for the file of the case, which is above as a whole.</p>" in page.html
     with open_result(tmp_path / "r.h5") as stored, style.applied():
         lines = draw(stored).axes[0].get_lines()
     looks = {str(line.get_label()): line.get_linestyle() for line in lines}
@@ -493,7 +497,19 @@ def test_scatter_has_its_study_and_its_probabilities_as_tables(
     names = "probability", "probability_lower", "probability_upper"
     share, low, high = (f"{float(found[name].sel(of)):.2%}" for name in names)
     assert squeal == [["squeal", share, f"{low} to {high}"]]
-    assert "brakecli advise CASE.toml --scatter STUDY.toml" in page.html
+    assert "<pre>brakecli advise c.toml --scatter STUDY.toml</pre>" in page.html
+    assert (
+        "<p>STUDY.toml stands for the file of the study: a page with --full has the text to copy.</p>" in page.html
+    )
+    given = "<p>STUDY.toml stands for the file of the study, which is above as it was given; its case is "
+    assert f"{given}c.toml.</p>" in page.html
+    other = brakecli.load(tmp_path / "s.toml", {"shoe.mass": 9.0})  # which no file has
+    brakecli.scatter(other, output=tmp_path / "o.h5")
+    page = reported(tmp_path / "o.h5")
+    assert "<pre>brakecli advise CASE.toml --scatter STUDY.toml</pre>" in page.html
+    unknown = "CASE.toml stands for the file of the case and STUDY.toml stands for the file of the study"
+    assert f"<p>{unknown}: a page with --full has the text to copy.</p>" in page.html
+    assert f"{given}the one above.</p>" in page.html
 
 
 def test_what_a_scene_does_not_require_is_no_warning(tmp_path: Path, compiled: None, plain: None) -> None:
