@@ -1,9 +1,11 @@
-"""A starter for a brake of one's own: a similar shoe with its mass, frequency, load and speed.
+"""A starter for a brake of one's own: a similar shoe with its mass, frequency, load and speed, and its friction.
 
 Shoes are similar where all that has no unit agrees. In units of the mass m, of 1/ω with the angular frequency ω of
 the mode that vibrates, and of the load Q, an amplitude is Q/(m ω²), a stiffness m ω² and a damping m ω. Equations
 (1)-(7) of similar shoes then differ by U m ω/Q alone. Waves as long as U/ω pass as often in a period, and the pad
 is as many of them long. Nothing but U depends on the radius, and nothing on the length of a smooth pad: both stay.
+Critical friction has no unit and does not depend on the brake's own, which may be another one: the frequency is
+that of the mode at this friction.
 """
 
 import math
@@ -12,7 +14,11 @@ from decimal import Decimal
 from functools import partial
 from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from brakecli.analysis.stability.modes import eigensystem
+from brakecli.analysis.stability.report import critical_friction
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.errors import UsageError
@@ -20,7 +26,7 @@ from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 
 STICKS_BELOW = 0.396
-"""U m ω/Q below which the shoe of the starter `case` sticks in every cycle, by bisection of runs.
+"""U m ω/Q below which the shoe of the starter `case` sticks in every cycle at its friction, by bisection of runs.
 
 Above, it leaves the wheel and never sticks.
 """
@@ -63,6 +69,7 @@ _IN_COMMENTS = {"m/s": Scales(time=-1.0, wavelength=1.0), "Hz": Scales(time=-1.0
 _HEADER = re.compile(r"(?:# )?\[([\w.]+)\]")
 _KEY = re.compile(r"((?:# )?)(\w+)( = )([^#\n]*?)( *)(#.*)?")
 _NUMBER = re.compile(r"[-+]?\b\d+(?:\.\d*)?(?:e[-+]?\d+)?")
+_FRICTION = re.compile(r"^(coefficient = )([^#\n]*)", re.MULTILINE)
 _SCHEDULES = re.compile(r"^(?:angular_speeds|forces) =", re.MULTILINE)
 _DIGITS = 6
 
@@ -74,6 +81,7 @@ class Brake(NamedTuple):
     frequency: float | None = None  # Hz, of the mode that vibrates
     load: float | None = None
     speed: float | None = None  # of the wheel's surface
+    friction: float | None = None
 
 
 class _Known(NamedTuple):
@@ -91,18 +99,30 @@ class Similar(NamedTuple):
     text: str
     number: float
     before: float
-    sticks: bool | None  # in every cycle, or never; None where only a run tells
+    sticks: bool | None = None  # in every cycle, or never; None where only a run tells
+    friction: float | None = None  # of the brake, where it is not that of the starter
+    critical: float | None = None  # critical friction of both, which is known where that is given
+    stable: bool | None = None  # sliding of the brake, likewise
 
     @property
     def sentence(self) -> str:
         """What is assumed, and what follows."""
-        kept = "friction, angles, and the ratios of all stiffnesses and dampings are those of the starter"
+        kept = "angles, and the ratios of all stiffnesses and dampings are those of the starter"
+        same = f"{kept}, and so is the critical friction"
+        if self.friction is None:
+            same = f"friction, {same}"
+        elif self.critical:
+            times = self.friction / self.critical
+            side = "above" if times > 1.0 else "below"
+            far = f"is {times:.3g} times" if times > 2.0 else f"lies {100.0 * abs(times - 1.0):.2g} % {side}"
+            own = f"the brake's own {self.friction:g} {far} that"
+            same = f"{same}, {self.critical:.3g}; {own}: sliding is {'stable' if self.stable else 'unstable'}"
         number = f"U m ω/Q is {self.number:.3g} (there {self.before:.3g})"
         regime = "quasi-harmonic: it leaves the wheel and does not stick"
         if self.sticks:
             regime = "relaxation: it sticks in every cycle"
         follows = f", so that it vibrates, {regime}" if self.sticks is not None else "; a run tells what follows"
-        return f"{kept}, and so is the critical friction; {number}{follows}"
+        return f"{same}; {number}{follows}"
 
 
 def similar(starter: str, text: str, brake: Brake) -> Similar:
@@ -115,37 +135,59 @@ def similar(starter: str, text: str, brake: Brake) -> Similar:
             f"{starter} has speeds at given times; give a starter whose wheel turns evenly, such as case"
         )
     system = system_of(parse_case(text, starter).case)
-    frequency = _frequency(system)
-    given = _Known(system.coefficients.m, frequency, system.load_at_start, abs(system.belt_speed))
+    before = _number(_known(system))
+    if brake.friction is not None:
+        text = _FRICTION.sub(partial(_with_friction, brake.friction), text)
+        system = system_of(parse_case(text, starter).case)
+    given = _known(system)
     mass = (brake.mass or given.mass) / given.mass
-    time = frequency / (brake.frequency or frequency)
+    time = given.frequency / (brake.frequency or given.frequency)
     load = (brake.load or given.load) / given.load
     length = load * time**2 / mass
     speed = brake.speed / given.speed if brake.speed else length / time
     factors = Scales(mass, time, length, speed * time, 1.0 if system.smooth else speed * time)
-    wanted = _Known(given.mass * mass, frequency / time, given.load * load, given.speed * speed)
+    wanted = _Known(given.mass * mass, given.frequency / time, given.load * load, given.speed * speed)
     number = _number(wanted)
-    sticks = number < STICKS_BELOW if starter == "case" else None
-    return Similar(_scaled(text, factors, _head(wanted, starter)), number, _number(given), sticks)
+    found = Similar(_scaled(text, factors, _head(wanted, starter, brake.friction)), number, before)
+    if brake.friction is None:
+        return found._replace(sticks=number < STICKS_BELOW if starter == "case" else None)
+    critical = critical_friction(system, _stiffness(system))
+    return found._replace(friction=brake.friction, critical=critical, stable=_values(system).real.max() <= 0.0)
 
 
 def _number(brake: _Known) -> float:
     return 2.0 * math.pi * brake.frequency * brake.speed * brake.mass / brake.load
 
 
-def _frequency(system: System) -> float:
-    """Frequency (Hz) of the mode that grows fastest, or decays slowest, beside steady sliding."""
+def _known(system: System) -> _Known:
+    """What a system has; the mode that vibrates grows fastest, or decays slowest, beside steady sliding."""
+    values = _values(system)
+    frequency = abs(float(values[values.real.argmax()].imag)) / (2.0 * math.pi)
+    return _Known(system.coefficients.m, frequency, system.load_at_start, abs(system.belt_speed))
+
+
+def _values(system: System) -> NDArray[np.complex128]:
+    """The eigenvalues of steady sliding, 1/s."""
     c = system.coefficients
+    return eigensystem(c, _stiffness(system), c.grip(system.belt_speed))[0]
+
+
+def _stiffness(system: System) -> float:
+    """Stiffness of the contact (N/m) in steady sliding, or of full contact where there is none."""
     rest = sliding(system)
-    stiffness = rest.stiffness if rest else system.contact_stiffness
-    values, _ = eigensystem(c, stiffness, c.grip(system.belt_speed))
-    return abs(float(values[values.real.argmax()].imag)) / (2.0 * math.pi)
+    return rest.stiffness if rest else system.contact_stiffness
 
 
-def _head(brake: _Known, starter: str) -> str:
+def _with_friction(friction: float, found: re.Match[str]) -> str:
+    """The line of the friction coefficient with another one; its comment stays in its column if it can."""
+    return f"{found[1]}{friction!r}".ljust(len(found[0]) - 1) + " "
+
+
+def _head(brake: _Known, starter: str, friction: float | None) -> str:
     """The first lines of the case, and its title."""
+    with_friction = "" if friction is None else f", with friction {friction:g}"
     of_brake = f"A brake of {brake.mass:g} kg at {brake.frequency:.4g} Hz, under {brake.load:g} N"
-    return f"{of_brake}, at {brake.speed:.4g} m/s: similar to the starter {starter}"
+    return f"{of_brake}, at {brake.speed:.4g} m/s{with_friction}: similar to the starter {starter}"
 
 
 def _scaled(text: str, factors: Scales, title: str) -> str:

@@ -20,7 +20,9 @@ OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_
 class Check:
     """Options of `check`."""
 
-    file: Annotated[str, Description('Case, sweep or study, or "-" for standard input.', "FILE.toml", by_place=True)]
+    file: Annotated[
+        str, Description('Case, sweep or study, or "-" for standard input.', "FILE.toml", by_place=True)
+    ]
     settings: Settings = None
 
 

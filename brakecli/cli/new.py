@@ -32,6 +32,7 @@ class New:
     frequency: Annotated[float | None, Description("Frequency of the mode that vibrates.", "HZ")] = None
     load: Annotated[float | None, Description("Force that presses the shoe on.", "N")] = None
     speed: Annotated[float | None, Description("Speed of the wheel's surface.", "M/S")] = None
+    friction: Annotated[float | None, Description("Its own friction coefficient.", "PHI")] = None
     force: Force = False
 
 
@@ -59,7 +60,7 @@ def command(options: New, quiet: Quiet = False) -> None:
         remedy = f"did you mean {near[0]}? A file of that name has the option -o"
         raise UsageError(f"no starter is called {printable(starter)}; {remedy}")
     base = text.partition('\ncase = "')[2].partition('"')[0]
-    brake = Brake(options.mass, options.frequency, options.load, options.speed)
+    brake = Brake(options.mass, options.frequency, options.load, options.speed, options.friction)
     of_brake = None
     if brake != Brake():
         if base:

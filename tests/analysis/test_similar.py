@@ -61,6 +61,29 @@ def test_a_brake_of_ones_own_is_similar_to_the_starter(starter: str, brake: Brak
         assert system.belt_speed == pytest.approx(brake.speed, rel=1e-5)
 
 
+@pytest.mark.parametrize("friction", [0.2, 0.55, 0.9])
+@pytest.mark.parametrize("starter", ["case", "branch", "pad", "rough"])
+def test_a_brake_has_its_own_friction_and_the_critical_one_of_the_starter(starter: str, friction: float) -> None:
+    before = report(parse_case(STARTERS[starter], starter).case)
+    found = similar(starter, STARTERS[starter], Brake(0.4, 1900.0, 8000.0, 8.0, friction))
+    case = parse_case(found.text, starter).case
+    new = report(case)
+    assert case.friction.coefficient == friction
+    assert new.modes[0].frequency == pytest.approx(1900.0, rel=1e-5)  # of the mode at this friction
+    assert before.critical is not None
+    assert new.critical is not None
+    assert new.critical.friction == pytest.approx(before.critical.friction, rel=1e-4)
+    assert found.critical == pytest.approx(before.critical.friction, rel=1e-9)
+    assert found.before == similar(starter, STARTERS[starter], Brake()).before
+    critical = before.critical.friction
+    part = 100.0 * abs(friction / critical - 1.0)
+    far = f"lies {part:.2g} % {'above' if friction > critical else 'below'}"
+    far = f"is {friction / critical:.3g} times" if friction > 2.0 * critical else far
+    said = f"so is the critical friction, {critical:.3g}; the brake's own {friction:g} {far} that: sliding is "
+    assert f"{said}{'stable' if new.stable else 'unstable'}; U m ω/Q" in found.sentence
+    assert "a run tells what follows" in found.sentence  # where the starter sticks is known for its friction alone
+
+
 def test_waves_pass_as_often_in_a_period() -> None:
     before = system_of(parse_case(STARTERS["rough"], "rough").case)
     after = system_of(case_of("rough", Brake(0.4, 1900.0, 8000.0, 8.0)))
@@ -116,6 +139,7 @@ def test_comments_say_the_speed_and_the_frequencies_of_the_brake() -> None:
         (("sweep", "--mass", "3"), "sweep is no case, and the numbers of a brake make one"),
         (("stop", "--mass", "3"), "stop has speeds at given times; give a starter whose wheel turns evenly"),
         (("pad", "--load", "0"), "--load: has to be above 0 (found 0)"),
+        (("pad", "--friction", "-0.3"), "--friction: has to be above 0 (found -0.3)"),
         (("pad", "--speed", "nan"), "--speed: has to be above 0 (found nan)"),
     ],
 )
@@ -133,6 +157,13 @@ def test_new_says_what_is_assumed_and_what_follows(tmp_path: Path) -> None:
     shown = brakecli("new", "squeal", *numbers, cwd=tmp_path).out
     assert "U m ω/Q is 4.78 (there 0.109)" in shown
     assert "quasi-harmonic" in shown
+    own = brakecli("new", "squeal", *numbers, "--friction", "0.45", "--force", cwd=tmp_path).out
+    assert "critical friction, 0.575; the brake's own 0.45 lies 22 % below that: sliding is stable" in own
+    text = (tmp_path / "squeal.toml").read_text()
+    assert "\ncoefficient = 0.45        # φ, the same in slip and in stick\n" in text
+    assert text.startswith(
+        "# A brake of 0.4 kg at 1900 Hz, under 8000 N, at 8 m/s, with friction 0.45: similar to"
+    )
     grams = brakecli("new", "squeal", "--mass", "400", "--load", "8", "--force", cwd=tmp_path)
     assert "shoe.mass: 400 kg is more than 300 kg; were grams meant?" in grams.err
     brakecli("new", "squeal", *numbers, "--force", cwd=tmp_path)
