@@ -105,3 +105,33 @@ def test_a_record_with_several_bursts_says_so_first() -> None:
     assert coarse.regime == Regime.UNDECIDED
     assert coarse.reasons[0].startswith("in 4 bursts, the strongest from ")
     assert "samples a cycle" in coarse.reasons[0]
+
+
+def saw_teeth(period: float, jitter: float, noise: float, seed: int = 7) -> np.ndarray:
+    """20 s of stick that loads at a constant rate, and of slip in a fiftieth of each period (s), at 1 kHz."""
+    random = np.random.default_rng(seed)
+    lengths = period * (1.0 + jitter * random.normal(size=int(20.0 / period) + 10))
+    ends = np.cumsum(lengths)
+    times = np.ravel([ends - 0.02 * period, ends], order="F")
+    heights = np.ravel([lengths, 0.0 * lengths], order="F")
+    clock = np.arange(20_000) / 1000.0
+    teeth: np.ndarray = np.interp(clock, [0.0, *times], [0.0, *heights])
+    return teeth + noise * period * random.normal(size=len(clock))
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 1e-2])
+@pytest.mark.parametrize("jitter", [0.0, 0.02, 0.05, 0.1])
+def test_the_flank_of_slow_stick_slip_is_no_burst(jitter: float, noise: float) -> None:
+    for cycles in (5, 6, 8):
+        values = saw_teeth(20.0 / cycles, jitter, noise)
+        assert bursts(values, 1e-3) == []
+        assert "burst" not in look(Signal(values, 1e-3), quantity=Measurand.DISPLACEMENT).verdict.reasons[0]
+    assert bursts(np.diff(saw_teeth(4.0, jitter, 0.0)), 1e-3) == []  # what rounding leaves in stick is no tone
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-3, 1e-2])
+@pytest.mark.parametrize("jitter", [0.0, 0.02])
+def test_a_tone_of_unbroken_stick_slip_is_that_of_the_whole_record(jitter: float, noise: float) -> None:
+    (whole,) = bursts(saw_teeth(20.0 / 30.0, jitter, noise), 1e-3)
+    assert whole.end - whole.start > 0.95 * 20.0
+    assert whole.frequency == pytest.approx(1.5, rel=0.02)

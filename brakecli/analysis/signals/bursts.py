@@ -1,9 +1,9 @@
 """Bursts: when a tone stands out of a measured signal, at which frequency and how strongly."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from brakecli.analysis.spectrum import FEWEST_CYCLES, Array, interpolated
@@ -15,9 +15,10 @@ _FEWEST = 4  # frames of a record at least
 _LOBE = 4.0  # bins that hold the main lobe of a Hann window
 _STANDS_OUT = 20.0  # power of a tone's bin over the mean of the noise, which reaches it in one bin of 5e8
 _SHARE = 0.3  # part of the energy of a frame in its tone
-_FAINT = 1e-3  # part of the power of the strongest tone
+_FAINT = 1e-3  # part of the power of the loudest frame: less is rounding, or nothing that stands out of the record
 _SAME = 0.06  # part of its frequency by which a tone may move from frame to frame
 _MOST = 32
+_Tone = tuple[int, float, float]  # first sample of a frame, and the frequency (1/sample) and power of its tone
 
 
 @dataclass(frozen=True)
@@ -34,6 +35,11 @@ class Burst:
         """Level squared times length."""
         return self.level**2 * (self.end - self.start)
 
+    def is_part_of(self, other: "Burst") -> bool:
+        """Whether it is the same tone at the same time."""
+        alike = abs(self.frequency - other.frequency) <= _SAME * other.frequency
+        return alike and other.start <= 0.5 * (self.start + self.end) <= other.end
+
     def numbers(self) -> dict[str, float]:
         """By the names of `--json`."""
         return {"start": self.start, "end": self.end, "frequency": self.frequency, "level": self.level}
@@ -47,50 +53,80 @@ def bursts(values: Array, interval: float) -> list[Burst]:
     period = len(values) / max(FEWEST_CYCLES + int(np.argmax(whole[FEWEST_CYCLES:])), 1)
     wanted = max(len(values) / _FRAMES, _CYCLES * period, _SHORTEST)
     size = 1 << int(min(np.ceil(np.log2(wanted)), np.log2(len(values) / _FEWEST)))
-    found = sorted(_tones(values, size), key=lambda tone: tone[0])
-    strongest = max((power for _, _, power in found), default=0.0)
-    groups: list[list[tuple[int, float, float]]] = []
-    for tone in (tone for tone in found if tone[2] >= _FAINT * strongest):
-        last = groups[-1][-1] if groups else (-size, 0.0, 0.0)
-        near = tone[0] - last[0] <= size // 2 and abs(tone[1] - last[1]) <= max(_SAME * tone[1], 1.0 / size)
-        groups = [*groups[:-1], [*groups[-1], tone]] if near else [*groups, [tone]]
+    groups: list[list[_Tone]] = []
+    for tone in _tones(values, size):
+        if groups and _lasts(values, size, groups[-1][-1], tone):
+            groups[-1].append(tone)
+        else:
+            groups.append([tone])
     groups = sorted(groups, key=lambda group: -sum(power for *_, power in group))[:_MOST]
-    results = (_burst(values, interval, size, group) for group in groups)
-    return sorted((burst for burst in results if burst), key=lambda burst: burst.start)
+    results: list[Burst] = []
+    for group in groups:
+        burst = _burst(values, interval, size, group)
+        if burst and not any(burst.is_part_of(other) for other in results):
+            results.append(burst)
+    return sorted(results, key=lambda burst: burst.start)
 
 
-def _tones(values: Array, size: int) -> Iterator[tuple[int, float, float]]:
-    """First sample, frequency (1/sample) and power of the tone of each frame in which one stands out."""
+def _tones(values: Array, size: int) -> list[_Tone]:
+    """The tones of the frames in which one stands out."""
     window = np.hanning(size)
     ramp = np.linspace(0.0, 1.0, size)
     frequencies = np.fft.rfftfreq(size).astype(np.float64)
+    loudest = 0.0
+    found = []
     for first in range(0, len(values) - size + 1, size // 2):
         part = values[first : first + size]
         flat = part - part[0] - (part[-1] - part[0]) * ramp
         power = np.abs(np.fft.rfft((flat - flat.mean()) * window)) ** 2
+        level = power * frequencies**2  # of the derivative: drift has a slope, but no line
         power[: _CYCLES - 2] = 0.0  # drift
+        loudest = max(loudest, float(power.sum()))
         i = int(np.argmax(power))
         tone = float(power[max(i - 2, 0) : i + 3].sum())
-        near = slice(max(_CYCLES - 2, i // 2), max(2 * i, 4 * _CYCLES))
-        level = power[near] * frequencies[near] ** 2  # of the derivative: drift has a slope, but no line
-        clear = power[i] * frequencies[i] ** 2 > _STANDS_OUT * float(np.median(level)) / np.log(2.0)
+        around = np.median(level[max(_CYCLES - 2, i // 2) : max(2 * i, 4 * _CYCLES)])
+        slower = np.median(level[i // 2 : i - 2])  # on the flank of a slow line, more than what is around
+        clear = level[i] > _STANDS_OUT * float(max(around, slower)) / np.log(2.0)
         if clear and tone >= _SHARE * power.sum():
-            yield first, interpolated(frequencies, power, i), tone
+            found.append((first, interpolated(frequencies, power, i), tone))
+    return [tone for tone in found if tone[2] >= _FAINT * loudest]
 
 
-def _burst(values: Array, interval: float, size: int, group: list[tuple[int, float, float]]) -> Burst | None:
+def _lasts(values: Array, size: int, last: _Tone, tone: _Tone) -> bool:
+    """Whether a tone is that of an earlier frame, and keeps half of its amplitude between the two."""
+    if abs(tone[1] - last[1]) > max(_SAME * tone[1], 1.0 / size):
+        return False
+    if tone[0] - last[0] <= size // 2:
+        return True
+    low, high = last[0], tone[0] + size
+    frequency = 0.5 * (last[1] + tone[1])
+    amplitude = _amplitude(_band(values[low:high], size, frequency), size, frequency)
+    least = amplitude[size // 2 : -size // 2].min()
+    return bool(least >= 0.5 * min(amplitude[:size].max(), amplitude[-size:].max()))
+
+
+def _begin(values: Array, size: int, frequency: float, first: int) -> int:
+    """The first sample of the earliest frame up to which the tone keeps half of its amplitude, frame by frame."""
+    while first > 0:
+        low = max(0, first - size)
+        earlier = max(0, first - size // 2)
+        amplitude = _amplitude(_band(values[low : first + size], size, frequency), size, frequency)
+        if amplitude[earlier - low : first - low].min() < 0.5 * amplitude[first - low :].max():
+            break
+        first = earlier
+    return first
+
+
+def _burst(values: Array, interval: float, size: int, group: list[_Tone]) -> Burst | None:
     """The burst of neighbouring frames, with its ends where the tone's amplitude is half."""
-    begin = group[0][0]
-    end = group[-1][0] + size
     weights = np.array([power for *_, power in group])
     frequency = float(np.average([f for _, f, _ in group], weights=weights))
+    begin = _begin(values, size, frequency, group[0][0])
+    end = len(values) - _begin(values[::-1], size, frequency, len(values) - group[-1][0] - size)
     low = max(0, begin - size)
     high = min(len(values), end + size)
-    piece = values[low:high] - np.linspace(values[low], values[high - 1], high - low)
-    lines = np.fft.fftfreq(len(piece))
-    half = max(_SAME * frequency, _LOBE / size)
-    tone = np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
-    amplitude = uniform_filter1d(2.0 * np.abs(tone), max(1, min(size // 4, int(2 / frequency))))
+    tone = _band(values[low:high], size, frequency)
+    amplitude = _amplitude(tone, size, frequency)
     first = begin - low
     last = end - low
     first = first + _edge(amplitude[first : first + size])
@@ -104,6 +140,19 @@ def _burst(values: Array, interval: float, size: int, group: list[tuple[int, flo
         frequency=float(turn) / (2.0 * np.pi * interval),
         level=float(np.sqrt(0.5 * np.mean(amplitude[first:last] ** 2))),
     )
+
+
+def _band(values: Array, size: int, frequency: float) -> NDArray[np.complex128]:
+    """A tone alone, as it turns: half of its amplitude, and its phase."""
+    piece = values - np.linspace(values[0], values[-1], len(values))
+    lines = np.fft.fftfreq(len(piece))
+    half = max(_SAME * frequency, _LOBE / size)
+    return np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
+
+
+def _amplitude(tone: NDArray[np.complex128], size: int, frequency: float) -> Array:
+    """Its amplitude, in the mean of two cycles."""
+    return np.asarray(uniform_filter1d(2.0 * np.abs(tone), max(1, min(size // 4, int(2 / frequency)))))
 
 
 def _edge(amplitude: Array) -> int:
