@@ -210,8 +210,8 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
     decided = int(known.sum())
     said = list[str]()
     lasts = regime != b"damped"
-    simple = done.all() and differ.ndim == 1 and (differ == (lasts[0] != lasts[1])).all()
-    if count and simple and (ends := _ends_of_loop(journal.plan, lasts)):
+    simple = differ.ndim == 1 and (differ == (lasts[0] != lasts[1]))[known].all()
+    if count and simple and (ends := _ends_of_loop(journal.plan, lasts, done)):
         said.append(f"hysteresis at {count} of {size} points: {ends}")
     elif count:
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:_LISTED]]
@@ -276,20 +276,40 @@ def _on_settled(journal: Journal) -> Iterator[str]:
     )
 
 
-def _ends_of_loop(plan: Plan, lasts: NDArray[Any]) -> str:
-    """Between which values vibration begins and ends on both ways, (2, points); empty if not once on each."""
+def _ends_of_loop(plan: Plan, lasts: NDArray[Any], known: NDArray[Any]) -> str:
+    """Where vibration begins and ends on both ways, (2, points), between points that are known.
+
+    Empty if on a way it does so more than once, or not at all with every point known.
+    """
     (axis,) = plan.sweep.axis
     values = np.array(_values(axis))
     said = list[str]()
-    for way, row, order in (("up", lasts[0], np.argsort(values)), ("down", lasts[1], np.argsort(-values))):
-        changes = np.flatnonzero(np.diff(row[order]))
-        if len(changes) != 1:
+    for way, row, there, order in zip(
+        ("up", "down"), lasts, known, (np.argsort(values), np.argsort(-values)), strict=True
+    ):
+        told = _change(row[order], there[order], [label(float(each)) for each in values[order]])
+        if not told:
             return ""
-        before, after = order[changes[0] : changes[0] + 2]
-        verb = "begins" if row[after] else "ends"
-        between = f"between {label(float(values[before]))} and {label(float(values[after]))}"
-        said.append(f"{verb} on the way {way} {between}")
+        verb, place = told
+        said.append(f"{verb} on the way {way} {place}")
     return f"along {', '.join(axis.parameter)} the vibration {said[0]}, and {said[1]}"
+
+
+def _change(lasts: NDArray[Any], known: NDArray[Any], values: list[str]) -> tuple[str, str] | None:
+    """What a vibration does once along points in their order, and where; None if this is not known."""
+    decided = np.flatnonzero(known)
+    changes = np.flatnonzero(np.diff(lasts[decided]))
+    if len(changes) == 1:
+        before, after = decided[changes[0] : changes[0] + 2]
+        return "begins" if lasts[after] else "ends", f"between {values[before]} and {values[after]}"
+    if len(changes) or known.all() or not len(decided):
+        return None
+    first, last = decided[0], decided[-1]
+    if last < len(known) - 1:  # the rest of the way is open
+        return "lasts" if lasts[last] else "has not begun", f"at {values[last]}, and what follows is not known"
+    if first == 0:
+        return None
+    return "begins" if lasts[first] else "ends", f"at {values[first]} or before"
 
 
 def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
@@ -300,7 +320,8 @@ def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
     if below := int((early > tolerance).sum()):
         start = "from the case's own start vibration lasts at values up to"
         least = "below the one at which steady sliding loses its stability"
-        yield f"hysteresis at {below} of {early.size} points: {start} {early.max():.3g} {least}"
+        both = f"vibration beside stable sliding at {below} of {early.size} points"
+        yield f"{both}: {start} {early.max():.3g} {least}"
     if above := int((late > tolerance).sum()):
         start = "the case's own start leads into lasting vibration only at values up to"
         longer = "above the critical one; longer runs may give another answer"

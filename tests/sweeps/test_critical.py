@@ -153,7 +153,7 @@ def test_a_range_without_a_change_says_so(method: str) -> None:
     assert found(SQUEAL, 0.0, 0.3, method=method).value is None
 
 
-def test_vibration_that_lasts_below_the_critical_friction_is_hysteresis() -> None:
+def test_vibration_lasts_below_the_critical_friction() -> None:
     """A stiff contact on a slow wheel: from rest the shoe lifts and sticks far below the loss of stability."""
     tables = {
         "shoe": {"mass": 15.7},

@@ -134,7 +134,7 @@ STEEP: dict[str, Any] = {  # bounces for 10 to 40 s, and then fades at the 0.010
         (RESTING, "link2__stiffness", (122400.0, 1020000.0), 900.0, (157.4e3, 157.7e3)),
     ],
 )
-def test_slow_decay_on_a_smooth_pad_is_no_hysteresis(
+def test_slow_decay_on_a_smooth_pad_does_not_last(
     tables: dict[str, Any], key: str, ends: tuple[float, float], tolerance: float, lives: tuple[float, float]
 ) -> None:
     answer = found(tables, *ends, key, tolerance=tolerance)
@@ -166,7 +166,7 @@ def test_what_lasts_at_the_lower_bound_only_does_not_last_throughout() -> None:
         (OPEN, "contact__stiffness", (2.336e8, 2.336e9), 2.1e6, 5.99e8),
     ],
 )
-def test_slow_decay_or_what_is_forced_on_a_rough_pad_is_no_hysteresis(
+def test_slow_decay_or_what_is_forced_on_a_rough_pad_does_not_last(
     tables: dict[str, Any], key: str, ends: tuple[float, float], tolerance: float, fades_up_to: float
 ) -> None:
     answer = found(tables, *ends, key, tolerance=tolerance)

@@ -16,7 +16,7 @@ from brakecli.sweeps.driver import TaskQueue
 from brakecli.sweeps.plan import LoadedSweep, Plan, parse_sweep, plan_of
 from brakecli.sweeps.point import line_points, next_start
 from brakecli.sweeps.record import Status, blank, record_type
-from brakecli.sweeps.result import SweepReport, _hysteresis
+from brakecli.sweeps.result import SweepReport, _hysteresis, _on_lasting_vibration
 from brakecli.sweeps.simulate import simulate
 from brakecli.sweeps.workers.task import Task, compute_units
 from tests.campaign import campaign
@@ -292,22 +292,37 @@ output.sample_interval = 1e-4
         ("qddd", "qqdd", "begins on the way up between 3 and 4, and ends on the way down between 3 and 2"),
         ("dqdd", "dqqd", "friction.coefficient = 2"),
         ("ddqq", "dqrq", "friction.coefficient = 3; friction.coefficient = 2"),
-        ("uddq", "ddqq", "friction.coefficient = 2"),
+        ("uddq", "ddqq", "ends on the way up between 1 and 2, and begins on the way down between 3 and 2"),
+        ("quddd", "qqqud", "begins on the way up between 2 and 4, and ends on the way down between 2 and 0"),
+        ("udddd", "uqqdd", "has not begun on the way up at 3, and what follows is not known, and ends on the"),
+        ("qdddd", "qqquu", "up between 3 and 4, and lasts on the way down at 2, and what follows is not known"),
+        ("qdddd", "uqqqd", "and ends on the way down between 1 and 0"),
+        ("qqqqu", "dqddd", "friction.coefficient = 4"),
     ],
 )
 def test_both_ends_of_a_loop_are_named_where_there_is_one_of_each(up: str, down: str, words: str) -> None:
-    """Letters stand for the regimes at 4, 3, 2, 1, the order of the file; both ways have the same amplitude."""
-    sweep = """case = "-"
-axis = [{ parameter = "friction.coefficient", values = [4, 3, 2, 1], direction = "both" }]"""
+    """Letters stand for the regimes at 4, 3, 2, 1, 0, as in the file; both ways have the same amplitude."""
+    values = [4, 3, 2, 1, 0][: len(up)]
+    sweep = f"""case = "-"
+axis = [{{ parameter = "friction.coefficient", values = {values}, direction = "both" }}]"""
     regimes = {each[:1]: each.encode() for each in ("damped", "quasi-harmonic", "relaxation", "undecided")}
     columns = {
         "regime": np.array([[regimes[each] for each in way] for way in (up, down)]),
-        "status": np.full((2, 4), Status.DONE.encode()),
-        "amplitude": np.ones((2, 4)),
-        "settled": np.ones((2, 4)),
+        "status": np.full((2, len(up)), Status.DONE.encode()),
+        "amplitude": np.ones((2, len(up))),
+        "settled": np.ones((2, len(up))),
     }
     journal: Any = SimpleNamespace(plan=Plan(sweep, GROWING), column=columns.__getitem__)
     assert words in _hysteresis(journal)[1][0]
+
+
+def test_vibration_beside_stable_sliding_is_told_apart_from_hysteresis() -> None:
+    """Hysteresis is what the two ways of a followed axis differ in; a search knows one start alone."""
+    columns = {"critical_sustained": [0.4, 1.0], "critical_lower": [1.0, 1.0], "critical_upper": [1.1, 1.1]}
+    journal: Any = SimpleNamespace(column=lambda name: np.array(columns[name]))
+    (said,) = _on_lasting_vibration(journal, 0.05)
+    assert said.startswith("vibration beside stable sliding at 1 of 2 points: from the case's own start")
+    assert "up to 0.6 below" in said
 
 
 def test_no_hysteresis_is_said_of_points_alone_that_are_decided(tmp_path: Path) -> None:
