@@ -30,6 +30,10 @@ _MARKERS = {
     "budget": "x",
     "end": "",  # where the line ends, without a mark
 }
+_THRESHOLDS: tuple[tuple[str, str, Any], ...] = (
+    ("critical", "squeals by itself", style.DOTS),
+    ("coexists_from", "can vibrate", (0, (6, 2, 1, 2))),
+)
 _SLIDING = "steady sliding"
 _QUANTITIES = {  # the words at their axis
     "amplitude": "amplitude of x",
@@ -85,11 +89,11 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
     for axes, name in zip(panels, names, strict=True):
         _panel(axes, branches, name, style.unit_of(known[name].attributes))
-        for threshold, text in (("critical", "squeals by itself"), ("coexists_from", "can vibrate")):
+        for threshold, text, look in _THRESHOLDS:
             value = attributes.get(threshold)
             if isinstance(value, int | float) and math.isfinite(value):
                 label = f"{text} from {value:.4g} on"
-                axes.axvline(float(value), color=style.GREY, lw=1.1, ls=style.DOTS, zorder=1.5, label=label)
+                axes.axvline(float(value), color=style.GREY, lw=1.1, ls=look, zorder=1.5, label=label)
     key = str(attributes.get("parameter", ""))
     units = style.unit_of(known["value"].attributes)
     style.set_ticks(panels[-1].xaxis, float(values.min()), float(values.max()), units, key)
@@ -122,9 +126,11 @@ def _panel(axes: Axes, branches: list[_Branch], name: str, unit: str) -> None:
     if name.startswith("amplitude") and len(sizes) and sizes.max() > _WIDE * sizes.min():
         axes.set_yscale("log")
         floor = _BELOW * float(sizes.min())
+    kinds = [branch.kind for branch in branches]
     for number, branch in enumerate(branches):
         colour = style.DARK if branch.slides else _COLOURS[(number - 1) % len(_COLOURS)]
         label = branch.kind + ", amplitude 0" * (branch.slides and floor > 0.0)
+        label += f", branch {number}" * (kinds.count(branch.kind) > 1)  # as the table in the terminal names it
         axes.plot([], [], color=colour, lw=1.8, label=label)
         _line(axes, {**branch.columns, name: np.maximum(branch.columns[name], floor)}, name, colour)
         _marks(axes, branch.marks, name, colour, floor)

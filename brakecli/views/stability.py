@@ -241,11 +241,23 @@ def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer
         rows.append(Row("file", str(numbers["output"])))
     tables = []
     for number, each in enumerate(numbers["branches"] or ()):
-        stable = sum(bool(point["stable"]) for point in each["points"])
-        head = f"branch {number}: {each['kind']}, {len(each['points'])} motions, {stable} of them stable"
+        points = _off_flutter(each)
+        stable = sum(bool(point["stable"]) for point in points)
+        there = " beside the one at flutter" * (len(points) < len(each["points"]))
+        head = f"branch {number}: {each['kind']}, {len(points)} motions{there}, {stable} of them stable"
         note = f" ({each['note']})" if each["note"] else ""
         tables.append(Table(_special_points(each["special"]), head + note))
     return View(title, sentences([str(numbers["sentence"] or "")]), [*rows, *tables])
+
+
+def _off_flutter(branch: Mapping[str, Any]) -> list[Any]:
+    """The motions of a branch without an end at flutter: sliding is neutral there, and so are its vibrations."""
+    points = [*branch["points"]]
+    sizes = [mark["amplitude"] for mark in branch["special"] if mark["kind"] == "flutter" and mark["amplitude"]]
+    for end in (0, -1):
+        if points and points[end]["amplitude"] in sizes:
+            points.pop(end)
+    return points
 
 
 def _special_points(marks: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:

@@ -18,12 +18,15 @@ from brakecli.errors import UsageError
 from brakecli.files.field import Field, integer
 from brakecli.files.read import open_result
 from brakecli.files.stability_fields import MOTION
-from brakecli.files.write import new_result
+from brakecli.files.write import ResultFile, new_result
 from brakecli.front.inputs import load_case
 from brakecli.plots.branch import _line, _with_ends
 from brakecli.plots.result import draw
-from brakecli.plots.style import BLUE, DARK, applied
+from brakecli.plots.style import BLUE, DARK, VERMILION, applied
 from brakecli.runs.branch import line_of
+from brakecli.views.render import TERMINAL
+from brakecli.views.stability import of_branch
+from brakecli.views.view import Table
 from tests.analysis.shoes import Shoe
 from tests.branches.phasewise import Phasewise
 from tests.campaign import campaign
@@ -134,6 +137,49 @@ def test_steady_sliding_is_full_up_to_its_flutter_and_dashed_beyond(here: Path, 
     )
 
 
+def test_the_neutral_motion_at_flutter_is_not_counted_as_unstable(found: dict[str, Any]) -> None:
+    """A branch of cycles that are all stable, but for the linear vibration at flutter from which they are born."""
+    cycle = found["branches"][1]
+    flutter, *others = cycle["points"]
+    assert not flutter["stable"]
+    stable = [point for point in others if point["stable"]]
+    for points in ([flutter, *stable], [*stable, flutter]):
+        tables = of_branch({**found, "branches": [{**cycle, "points": points}]}, "", "1", TERMINAL).blocks
+        (head,) = [each.title for each in tables if isinstance(each, Table)]
+        assert f"{len(stable)} motions beside the one at flutter, {len(stable)} of them stable" in head
+
+
+def test_two_cycles_have_a_colour_each_and_two_thresholds_a_line_each_in_the_legend(tmp_path: Path) -> None:
+    with new_result(tmp_path / "two.h5", force=False) as result:
+        about = {"kind": "branch", "parameter": "friction.coefficient", "critical": 0.6, "coexists_from": 0.3}
+        result.set_attributes(about)
+        for number, kind in enumerate(("steady sliding", "limit cycle", "limit cycle")):
+            _write_branch(result, f"branch_{number}", kind)
+        result.commit()
+    with open_result(tmp_path / "two.h5") as stored, applied():
+        upper: Any = draw(stored).axes[0]
+    artists, names = upper.get_legend_handles_labels()
+    handles = dict(zip(names, artists, strict=True))
+    assert handles["limit cycle, branch 1"].get_color() == BLUE
+    assert handles["limit cycle, branch 2"].get_color() == VERMILION
+    assert "steady sliding" in handles
+    looks = [handles[f"{text} on"] for text in ("squeals by itself from 0.6", "can vibrate from 0.3")]
+    assert looks[0]._dash_pattern != looks[1]._dash_pattern
+
+
+def _write_branch(result: ResultFile, group: str, kind: str) -> None:
+    """A branch of two motions without special points."""
+    result.axis(group, integer("point", "number"), range(2))
+    result.set_attributes({"kind": kind}, group)
+    for name in ("value", "amplitude", "frequency", "stable"):
+        result.column(Field(name, "1", name), ("point",), [0.0, 1.0], group)
+    inner = f"{group}/special"
+    result.axis(inner, integer("special", "number"), range(0))
+    for name in ("value", "amplitude", "frequency"):
+        result.column(Field(name, "1", name), ("special",), [], inner)
+    result.column(Field("kind", "", "kind", "S16"), ("special",), [], inner)
+
+
 @pytest.mark.parametrize("variable", ["", "vx"])
 def test_steady_sliding_stands_at_the_foot_of_a_logarithmic_axis(
     variable: str, here: Path, found: dict[str, Any]
@@ -218,14 +264,7 @@ def test_numbers_that_an_older_file_lacks_are_named_with_the_remedy(
     older = tmp_path / "older.h5"
     with new_result(older, force=False) as result:
         result.set_attributes({"kind": "branch", "parameter": "friction.coefficient"})
-        result.axis("branch_0", integer("point", "number"), range(2))
-        result.set_attributes({"kind": "steady sliding"}, "branch_0")
-        for name in ("value", "amplitude", "frequency", "stable"):
-            result.column(Field(name, "1", name), ("point",), [0.0, 1.0], "branch_0")
-        result.axis("branch_0/special", integer("special", "number"), range(0))
-        for name in ("value", "amplitude", "frequency"):
-            result.column(Field(name, "1", name), ("special",), [], "branch_0/special")
-        result.column(Field("kind", "", "kind", "S16"), ("special",), [], "branch_0/special")
+        _write_branch(result, "branch_0", "steady sliding")
         result.commit()
     command("plot", "older.h5", "-o", "a.png", cwd=tmp_path).told(0)
     command("plot", "older.h5", "-o", "b.png", "--variable", "mean", cwd=tmp_path).told(
