@@ -9,11 +9,14 @@ from scipy.interpolate import CubicHermiteSpline
 from brakecli.case.system import system_of
 from brakecli.errors import UsageError
 from brakecli.faces import argument
+from brakecli.files.numbers import stored_numbers
 from brakecli.files.read import BLOCK, StoredResult
 from brakecli.plots import style
 from brakecli.plots.quantities import scaled
 from brakecli.plots.run import case_of
 from brakecli.solver.period import common_period
+from brakecli.views.motion import motion_sentence
+from brakecli.views.render import TERMINAL
 
 MOST = 200_000  # samples whose time is drawn, the last ones
 WAVE = "wave"
@@ -47,7 +50,9 @@ def draw(result: StoredResult, section: str) -> Figure:
     last = {name: result.read("history", name, first) for name in _STATE}
     count = f"{len(points['x'])} points from {begin:.4g} s on"
     title = case_of(result).case.title or "Case without a title"
-    figure = style.headed(10.4, 4.6, title, f"Poincaré section {where}   ·   {count}", columns=2, wspace=0.05)
+    verdict = motion_sentence(stored_numbers(result), TERMINAL)  # how the dots are to be read: a torus, chaos
+    lines = f"Poincaré section {where}   ·   {count}", verdict
+    figure = style.headed(10.4, 4.81, title, *lines, columns=2, wspace=0.05)
     pairs = (("x", "y"), ("x", "vy")) if section in _WITH_THE_WHEEL else (("x", "vx"), ("y", "vy"))
     spreads = {name: (float(np.ptp(points[name])), float(np.ptp(last[name]))) for name in _STATE}
     for axes, pair in zip(style.panels(figure, 1, 2).flat, pairs, strict=True):

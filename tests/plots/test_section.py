@@ -10,6 +10,7 @@ from matplotlib.text import Text
 
 from brakecli.case.read import parse_case
 from brakecli.errors import UsageError
+from brakecli.files.numbers import stored_numbers
 from brakecli.files.read import open_result
 from brakecli.plots import section as sections
 from brakecli.plots.result import draw
@@ -114,6 +115,25 @@ def test_dots_and_motion_are_those_of_the_same_time(
     for axes in section(runs["forced"], "wave"):
         assert len(points(axes, "motion")) == samples
         assert len(points(axes, "section")) == pytest.approx(0.1 * FREQUENCY, abs=1.0)
+
+
+TORUS = "with a phase of its own (a torus: 173 Hz and the frequencies of the waves are incommensurate)"
+
+
+@pytest.mark.parametrize(
+    ("regime", "words"), [("relaxation", "in every cycle"), ("quasi-harmonic", "without stick")]
+)
+def test_the_verdict_stands_above_the_section(
+    regime: str, words: str, runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    told = {"regime": regime, "excitation": "self-excited", "reasons": (f"the vibration lasts, {TORUS}",)}
+    with open_result(runs["forced"]) as result, applied():
+        read = stored_numbers(result)
+        assert read["reasons"]
+        monkeypatch.setattr("brakecli.plots.section.stored_numbers", lambda _: {**read, **told})
+        shown = " ".join(text.get_text() for text in draw(result, section="wave").findobj(Text))
+    assert words in shown
+    assert TORUS.replace(" ", "") in shown.replace(" ", "")
 
 
 @pytest.mark.parametrize(
