@@ -54,9 +54,9 @@ def of_run(numbers: Mapping[str, Any], title: str, output: str, show: Renderer) 
 
 def of_verdict(numbers: Mapping[str, Any], source: str, show: Renderer) -> View:
     """A verdict with its evidence, by the names and values that `--json` gives them."""
-    unit = numbers.get("unit", "")
+    unit = str(numbers.get("unit") or "")
     noise_unit = "m/s" if unit == "m/s²" else unit  # an acceleration is judged by its integral
-    rows = [*_numbers(numbers, show), *_torque(numbers, show)]
+    rows = [*_ringing(numbers, show), *_numbers(numbers, show), *_torque(numbers, show)]
     tones = numbers.get("bursts") or ()
     for tone in tones[:MOST_LISTED_BURSTS]:
         when = f"{tone['start']:.4g} to {tone['end']:.4g} s"
@@ -154,11 +154,23 @@ def _numbers(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
     shares = _known(numbers, "stick_fraction", "contact_loss_fraction")
     rows += [Row(each.title, show.field(each, share), detail=changes or not share) for each, share in shares]
     aside = [Row("regime", str(numbers.get("regime", "")))]
-    aside += [Row(each.title, show.field(each, value)) for each, value in _known(numbers, *_ASIDE)]
+    told = [name for name in _ASIDE if name != "ringing_frequency" or numbers.get("damping_ratio") is None]
+    aside += [Row(each.title, show.field(each, value)) for each, value in _known(numbers, *told)]
     intervals = numbers.get("vibrations") or ()
     aside += [Row("vibrates", f"{each['start']:.4g} to {each['end']:.4g} s") for each in intervals[MOST_SAID:]]
     aside += [Row("disturbances", each) for each in disturbances(numbers)]
     return [*rows, *details(*aside)]
+
+
+def _ringing(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
+    """With what a measured vibration has died out."""
+    if numbers.get("damping_ratio") is None:
+        return []
+    frequency, ratio = (
+        show.with_error(numbers[name], numbers[f"{name}_error"], unit)
+        for name, unit in (("ringing_frequency", "Hz"), ("damping_ratio", ""))
+    )
+    return [Row("rings at", frequency), Row("damping ratio", ratio)]
 
 
 def _torque(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:

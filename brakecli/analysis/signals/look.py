@@ -10,6 +10,7 @@ import numpy as np
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.signals.bursts import Burst, bursts
 from brakecli.analysis.signals.cleaning import Velocity, cleaned, without_drift, without_spikes
+from brakecli.analysis.signals.decay import Ringing, ringing
 from brakecli.analysis.signals.measure import Heard, answers
 from brakecli.analysis.signals.slips import Slips, seek
 from brakecli.analysis.signals.table import SignalThresholds, decide
@@ -70,6 +71,10 @@ class SignalVerdict:
     warnings: tuple[str, ...]
     thresholds: SignalThresholds
     unit: str  # of the record, and of what is told of its bursts
+    ringing_frequency: float | None = None  # Hz, of what has died out, by its logarithmic decrement
+    ringing_frequency_error: float | None = None  # Hz, a standard error
+    damping_ratio: float | None = None
+    damping_ratio_error: float | None = None
     excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
     contact_loss_fraction: None = None  # nor whether contact was lost
 
@@ -151,6 +156,7 @@ def _judge(
     known = {Measurand.FORCE: stiffness, Measurand.TORQUE: None, Measurand.PRESSURE: None}.get(quantity, 1.0)
     spring = math.nan if known is None else known
     belt = math.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
+    raw = velocity
     slips = seek(velocity, certain)
     sure = slips.stick_slip and slips.skewness >= certain
     velocity = without_drift(velocity, len(velocity.smoothed(slips.scale)) / slips.count if sure else 0.0, notes)
@@ -181,4 +187,14 @@ def _judge(
         thresholds=thresholds,
         unit=FULL_SCALE if signal.relative else MEASURED_UNITS[quantity],
     )
+    if decision.regime is Regime.DAMPED:
+        raw = raw if order < 2 else cleaned(signal.values / size, 1)[0]  # with its drift: no sum bends the decay
+        if rings := _ringing(raw, step, heard.line, thresholds):
+            verdict = replace(verdict, **asdict(rings))
     return SignalLook(verdict, signal, quantity, velocity, slips, heard.smoothing)
+
+
+def _ringing(raw: Velocity, step: float, line: float, thresholds: SignalThresholds) -> Ringing | None:
+    """With what it dies out, by a velocity of which nothing was taken; `line` in cycles per sample."""
+    noise = raw.noise * (1.0 if raw.measured else 2.0 * math.sin(math.pi * line))  # at the line, of a difference
+    return ringing(raw.values, step, line, noise, thresholds.sure_errors)
