@@ -27,6 +27,7 @@ _QUIET = 1e-3  # part of the power that may be left out unsaid
 _LARGEST_RATIO = 10_000  # whole numbers of samples that a resampled sound is made by
 _LOST = 1e-6  # of the largest value: a sound that is less is none
 _HEARD = 20.0  # Hz
+_FADED = 0.01  # of its peak, 40 dB below it: what is less of a sound is not heard beside it; a choice
 _FORMULAS = ("=", "+", "-", "@")  # what begins one in a spreadsheet
 _UNEVEN = 1e-3  # of the time between two samples, by which it may vary
 _TABLES = (
@@ -243,6 +244,10 @@ def _sound(result: StoredResult, name: str, part: Part) -> tuple[bytes, list[str
     tone = result.attributes.get("frequency") or frequency[np.argmax(power)]
     if tone < _HEARD or tone > 0.5 * RATE:
         notes.append(f"the vibration at {tone:.4g} Hz cannot be heard")
+    if [result.attributes.get(name) for name in ("regime", "excitation")] == ["damped", "none"]:
+        heard = np.flatnonzero(np.abs(sound) > _FADED * peak)[[0, -1]] / RATE
+        when = f"from {heard[0]:.3g} to {heard[1]:.3g} s of {len(sound) / RATE:.3g} s"
+        notes.append(f"the motion dies out: it is heard {when}, and elsewhere is below {_FADED:.0%} of its peak")
     stream = io.BytesIO()
     wavfile.write(stream, RATE, np.round(sound * (PEAK * 32767.0 / peak)).astype(np.int16))
     return stream.getvalue(), notes

@@ -240,6 +240,26 @@ def test_a_tone_below_hearing_is_told_whether_it_is_sustained_or_not(tmp_path: P
     assert 0.5 * lowest < float(found[1]) < 2.0 * lowest + 1.0 / 3.0  # Hz, the distance of lines of 3 s
 
 
+@pytest.mark.parametrize("start", [0.0, 0.4])
+def test_the_sound_of_what_dies_out_tells_when_it_is_heard(start: float, tmp_path: Path) -> None:
+    """Of a decay by a rate a hundredth is left after log(100) over it; the part that is cut out begins anew."""
+    (tmp_path / "tiny.toml").write_text(SQUEAL)
+    change = [
+        f"--set={each}" for each in ("friction.coefficient=0.55", "wheel.angular_speed=1", "solver.duration=1.2")
+    ]
+    run = brakecli("run", "tiny.toml", "-q", "-o", "r.h5", "--json", *change, cwd=tmp_path)
+    run.told(0)
+    done = brakecli("export", "r.h5", "-o", "r.wav", "--from", str(start), cwd=tmp_path)
+    said = re.search(r"the motion dies out: it is heard from (\S+) to (\S+) s of (\S+) s", done.told(0))
+    assert said
+    begin, end, whole = map(float, said.groups())
+    assert begin < 0.01
+    assert whole == pytest.approx(1.2 - start, abs=1e-3)
+    assert end == pytest.approx(
+        min(math.log(100.0) / -run.json["growth_rate"], whole), rel=0.2
+    )  # beside a second mode
+
+
 def test_samples_that_are_not_equally_spaced_make_no_sound(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "r.h5").write_bytes((folder / "a.h5").read_bytes())
     with edited(tmp_path / "r.h5") as file:
