@@ -48,7 +48,8 @@ VERDICT = within(
     Field(
         "torque_variation",
         "N m",
-        "braking torque, peak to peak; missing if it rings or samples miss impacts",
+        "braking torque, peak to peak; where it dies out, of the last tenth; missing if it rings or "
+        "samples miss impacts",
         label="torque variation (peak to peak)",
     ),
     integer("settled", "whether a settled part was found (0, 1); otherwise the second half is judged"),

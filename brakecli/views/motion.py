@@ -150,7 +150,7 @@ def _numbers(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
     known = numbers.get("amplitude")
     if known is not None:
         amplitude = show.with_error(known, spread if spread is not None and spread < known else None, "m")
-        rows.append(Row("amplitude of x", amplitude, detail=changes))
+        rows.append(Row("amplitude of x", amplitude + _when(numbers), detail=changes))
     shares = _known(numbers, "stick_fraction", "contact_loss_fraction")
     rows += [Row(each.title, show.field(each, share), detail=changes or not share) for each, share in shares]
     aside = [Row("regime", str(numbers.get("regime", "")))]
@@ -175,7 +175,15 @@ def _ringing(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
 
 def _torque(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
     """The mean braking torque and its variation, where they are known."""
-    return [Row(each.title, show.field(each, value)) for each, value in _known(numbers, *_TORQUE)]
+    when = {"torque_variation": _when(numbers)}
+    known = _known(numbers, *_TORQUE)
+    return [Row(each.title, show.field(each, value) + when.get(each.name, "")) for each, value in known]
+
+
+def _when(numbers: Mapping[str, Any]) -> str:
+    """From when the amplitude and the variation of the torque are, where a run dies out."""
+    run = numbers.get("amplitude_first") is not None
+    return ", in the last tenth" * (run and numbers.get("excitation") == Excitation.NONE)
 
 
 def _known(numbers: Mapping[str, Any], *names: str) -> list[tuple[Field, Any]]:

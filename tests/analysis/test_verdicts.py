@@ -50,6 +50,19 @@ def test_a_slow_motion_is_judged_by_its_eigenvalues(friction: float) -> None:
     assert verdict.settled is False
 
 
+def test_amplitude_and_variation_of_what_dies_out_are_those_of_the_same_time() -> None:
+    """Of a single mode y is x times its shape, and the torque varies by R φ 2ak as much as y."""
+    case = make(SQUEAL, friction__coefficient=0.55, wheel__angular_speed=1.0, solver__duration=2.0)
+    verdict = verdict_of(case)
+    system = system_of(case)
+    mode = stability(system).modes[0]
+    assert verdict.regime is Regime.DAMPED
+    assert mode.shape is not None
+    y = 2.0 * verdict.amplitude * abs(mode.shape)
+    expected = system.radius * system.coefficients.phi * system.contact_stiffness * y
+    assert verdict.torque_variation == pytest.approx(expected, rel=0.02)  # a quarter of a cycle decays by 0.6 %
+
+
 def test_growth_that_the_steps_damp_is_not_waited_for() -> None:
     """It grows at 0.16 1/s; weights of 0.6 take 0.1 ω² h away, 1.2 1/s at 174 Hz in steps of 10 µs."""
     for weights, remedy in (

@@ -11,7 +11,7 @@ from brakecli.analysis.regime.answers import QUARTER, Answers, shown_after
 from brakecli.analysis.regime.closed import RELAXED, ROOM, Lasting, forced_linear
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
-from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.evidence import Part, tenths
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.stability.linear import parts
 from brakecli.solver.alike import at_once
@@ -67,8 +67,11 @@ def _lasting(
     else:
         part = shown.part(shown.half) if answers.linear else shown.judged
         stays = not answers.moves or answers.carried_along  # all else dies, or is not known
-        damped = decision.regime is Regime.DAMPED
-        return Lasting(part, answers.settled and stays, shown.seen.final if damped else part.amplitude("x"))
+        found = Lasting(part, answers.settled and stays, part.amplitude("x"))
+        if decision.regime is Regime.DAMPED:  # amplitude and variation are those of the same time
+            found.amplitude = shown.seen.final
+            found.force_from = tenths(shown.samples)[1]
+        return found
     if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
         found.forced = found.amplitude
     if found.cycles and shown.context.forced and _holds_two(shown, found.part):
