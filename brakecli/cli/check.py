@@ -28,7 +28,7 @@ class Check:
 
 @with_options
 def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> None:
-    """Validate a case, sweep or study; what it takes, its limits."""
+    """Validate a case, sweep or study; what it takes."""
     kind = kind_of_file(options.file)
     if kind == "study":
         _check_study(options, as_json=as_json, quiet=quiet)
