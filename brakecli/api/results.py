@@ -59,13 +59,13 @@ def classify(options: Classify) -> "xr.Dataset":
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
     from brakecli.files.as_xarray import dataset
-    from brakecli.files.fields import EXPONENT, UNIT, VERDICT
+    from brakecli.files.fields import DYING, EXPONENT, UNIT, VERDICT
     from brakecli.front.verdict import verdict_on
 
     with called(), as_files([options.source], "result") as (file,):
         numbers = verdict_on(str(file), options)
     warn(numbers.get("warnings", ()))
-    return dataset((*VERDICT, *EXPONENT, UNIT), numbers)
+    return dataset((*VERDICT, *EXPONENT, *DYING, UNIT), numbers)
 
 
 @takes(Plot)

@@ -72,6 +72,12 @@ VERDICT = within(
     ),
     Field("thresholds", "", "numbers that decide a verdict", OBJECT, group="regime/thresholds"),
 )
+DYING = (
+    Field("ringing_frequency_error", "Hz", "standard error of the frequency of a measured record that dies out"),
+    Field("damping_ratio", "1", "damping ratio of a measured record that dies out, by its logarithmic decrement"),
+    Field("damping_ratio_error", "1", "standard error of that damping ratio"),
+)
+"""What else a measured record shows that dies out; a run has the eigenvalues instead."""
 UNIT = Field("unit", "", "unit of a measured record and of its bursts", TEXT)
 MEASURED_UNITS = {"displacement": "m", "velocity": "m/s", "force": "N", "torque": "N m"}
 MEASURED_UNITS |= {"acceleration": "m/s²", "pressure": "Pa"}

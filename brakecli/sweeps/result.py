@@ -304,7 +304,8 @@ def _change(lasts: NDArray[Any], known: NDArray[Any], values: list[str]) -> tupl
         return "begins" if lasts[after] else "ends", f"between {values[before]} and {values[after]}"
     if len(changes) or known.all() or not len(decided):
         return None
-    first, last = decided[0], decided[-1]
+    first = decided[0]
+    last = decided[-1]
     if last < len(known) - 1:  # the rest of the way is open
         return "lasts" if lasts[last] else "has not begun", f"at {values[last]}, and what follows is not known"
     if first == 0:

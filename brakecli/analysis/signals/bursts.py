@@ -98,9 +98,9 @@ def _lasts(values: Array, size: int, last: _Tone, tone: _Tone) -> bool:
         return False
     if tone[0] - last[0] <= size // 2:
         return True
-    low, high = last[0], tone[0] + size
+    between = slice(last[0], tone[0] + size)
     frequency = 0.5 * (last[1] + tone[1])
-    amplitude = _amplitude(_band(values[low:high], size, frequency), size, frequency)
+    amplitude = _amplitude(_band(values[between], size, frequency), size, frequency)
     least = amplitude[size // 2 : -size // 2].min()
     return bool(least >= 0.5 * min(amplitude[:size].max(), amplitude[-size:].max()))
 
