@@ -750,7 +750,8 @@ def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
 
 def test_a_measured_record_that_dies_out_has_its_damping_ratio(tmp_path: Path) -> None:
     time = np.arange(4000) * 1e-4
-    rate, ratio = 2.0 * math.pi * 150.0, 0.02
+    rate = 2.0 * math.pi * 150.0
+    ratio = 0.02
     shape = np.exp(-ratio * rate * time) * np.cos(math.sqrt(1.0 - ratio**2) * rate * time)
     np.savetxt(tmp_path / "d.csv", np.column_stack([time, 1e-5 * shape]), header="t,x", delimiter=",", comments="")
     verdict = brakecli.classify(tmp_path / "d.csv", "displacement", column="x", time_column="t")
