@@ -12,10 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.branches.explore import Explorer
-from brakecli.branches.line import Line
-from brakecli.branches.sliding import Sliding
-from brakecli.branches.told import LIMIT_CYCLE
+from brakecli.analysis.branches.explore import Explorer
+from brakecli.analysis.branches.line import Line
+from brakecli.analysis.branches.sliding import Sliding
+from brakecli.analysis.branches.told import LIMIT_CYCLE
 from tests.analysis.shoes import Shoe, random_shoes
 from tests.examples import make
 

@@ -18,11 +18,11 @@ from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 
-from brakecli.sweeps.driver import journal_path, sweep
-from brakecli.sweeps.workers.dask import ClusterEngine
+from brakecli.studies.sweeps.driver import journal_path, sweep
+from brakecli.studies.sweeps.workers.dask import ClusterEngine
 from tests.commands import started, wait_until
-from tests.sweeps.helpers import axis, quick, write_sweep
-from tests.sweeps.test_cluster import Cluster, cluster_of
+from tests.studies.sweeps.helpers import axis, quick, write_sweep
+from tests.studies.sweeps.test_cluster import Cluster, cluster_of
 
 MADE_UP = 1_000_000
 ROUGH = Path(__file__).parents[1] / "cases" / "accuracy" / "B.toml"

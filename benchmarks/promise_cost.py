@@ -16,14 +16,14 @@ from time import process_time
 
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.comparison.compare import errors
-from brakecli.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.errors import BrakecliError
-from brakecli.runs.tolerance import certify
 from brakecli.solver.arrays import Floats
 from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
 from brakecli.solver.system import System
+from brakecli.studies.comparison.compare import errors
+from brakecli.studies.comparison.methods import kinds, ladder, method_label, rungs
+from brakecli.studies.runs.tolerance import certify
 
 CASES = Path(__file__).parents[1] / "cases"
 NAMES = {"B": "accuracy/B.toml", "C": "accuracy/C.toml", "full contact": "rough-full-contact.toml"}

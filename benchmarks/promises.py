@@ -17,12 +17,12 @@ import numpy as np
 
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
-from brakecli.comparison.compare import errors
 from brakecli.errors import BrakecliError
-from brakecli.runs.tolerance import certify
 from brakecli.solver.integrate import solve
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.quantities import HISTORY, ContactState
+from brakecli.studies.comparison.compare import errors
+from brakecli.studies.runs.tolerance import certify
 
 KINDS = (
     "flat, sliding",

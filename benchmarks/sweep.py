@@ -12,10 +12,10 @@ import tempfile
 import time
 from pathlib import Path
 
-from brakecli.front.inputs import load_sweep
-from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.point import compute
+from brakecli.api.inputs import load_sweep
+from brakecli.studies.sweeps.driver import choose_engine, sweep
+from brakecli.studies.sweeps.plan import LoadedSweep
+from brakecli.studies.sweeps.point import compute
 
 CASE = Path(__file__).parents[1] / "cases" / "relaxation.toml"
 ROUNDS = 3

@@ -10,7 +10,7 @@ from brakecli.about import fix_environment
 if os.name == "nt":  # before anything is imported that Windows lacks
     sys.stderr.write("brakecli: does not run on Windows itself; use its Subsystem for Linux (WSL)\n")
     sys.exit(2)
-from brakecli.files.os_signals import guard_streams, handle_signals, ignore_signals
+from brakecli.results.os_signals import guard_streams, handle_signals, ignore_signals
 
 
 def main() -> None:

@@ -21,9 +21,9 @@ from PIL import Image
 
 from brakecli.analysis.regime.decision import Thresholds
 from brakecli.case.read import parse_case
-from brakecli.files.read import open_result
-from brakecli.runs.run import run
+from brakecli.results.read import open_result
 from brakecli.solver.quantities import ContactState
+from brakecli.studies.runs.run import run
 
 DOCS = Path(__file__).parent
 CASES = DOCS.parent / "cases"

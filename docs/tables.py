@@ -1,7 +1,7 @@
 """The tables of the documentation that the program declares: `make tables`.
 
 What a result holds stands between `<!-- fields NAME … -->` and `<!-- end of fields -->`, where each NAME is one of
-`fields`, `stability_fields` and `contents` in brakecli/files/. The rows by which a verdict is found stand between
+`fields`, `stability_fields` and `contents` in brakecli/results/. The rows of a verdict stand between
 `<!-- rows NAME -->` and `<!-- end of rows -->`, with a NAME of brakecli/analysis/regime/table.py. Their second
 column, where a row holds, is written by hand; a new row has a `?` there.
 
@@ -15,7 +15,7 @@ from typing import Any
 
 from brakecli.analysis.regime import table as verdicts
 from brakecli.analysis.regime.decision import Excitation, Regime, Row
-from brakecli.files import contents, fields, stability_fields
+from brakecli.results import contents, fields, stability_fields
 
 PLACE = re.compile(r"(<!-- fields ([A-Z_ ]+) -->\n).*?(<!-- end of fields -->)", re.DOTALL)
 ROWS = re.compile(r"(<!-- rows ([A-Z]+) -->\n)(.*?)(<!-- end of rows -->)", re.DOTALL)

@@ -25,4 +25,4 @@ def compiled() -> None:
 @pytest.fixture
 def without_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Searches for critical values without the runs that say from where on vibration lasts."""
-    monkeypatch.setattr("brakecli.sweeps.sustained.verdict_of", lambda case: None)
+    monkeypatch.setattr("brakecli.studies.sweeps.sustained.verdict_of", lambda case: None)

@@ -5,7 +5,7 @@ from typing import Any
 
 from brakecli.analysis.regime.decision import Decision, Row
 from brakecli.analysis.regime.verdict import Verdict
-from brakecli.files.field import Field
+from brakecli.results.field import Field
 
 _UNKNOWN = re.compile(r"(?<![\w./-])(nan|inf)(?![\w./])")
 _GIVEN = "found nan", "found inf"  # of a user, as a message repeats it

@@ -21,11 +21,11 @@ import typer
 import xarray as xr
 
 import brakecli
+from brakecli.api import progress
+from brakecli.api.progress import telling
+from brakecli.api.records import Report
 from brakecli.cli.app import app
 from brakecli.errors import BrakecliError, CaseError, UnreadableResultError, UsageError
-from brakecli.front import progress
-from brakecli.front.progress import telling
-from brakecli.front.records import Report
 from brakecli.views.view import sentence
 from tests.campaign import campaign
 from tests.commands import QUICK, ROOT, TINY, attributes, left_in

@@ -13,18 +13,18 @@ from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
-from brakecli.comparison.compare import compare
-from brakecli.comparison.result import ComparisonReport, write
-from brakecli.files import stability_fields as fields
-from brakecli.files.field import values_of
-from brakecli.files.read import open_result
-from brakecli.plots.branch import _MARKERS
-from brakecli.runs.run import run
-from brakecli.sweeps.plan import parse_sweep
-from brakecli.sweeps.workers.task import compute_units
+from brakecli.results import stability_fields as fields
+from brakecli.results.field import values_of
+from brakecli.results.read import open_result
+from brakecli.studies.comparison.compare import compare
+from brakecli.studies.comparison.result import ComparisonReport, write
+from brakecli.studies.runs.run import run
+from brakecli.studies.sweeps.plan import parse_sweep
+from brakecli.studies.sweeps.workers.task import compute_units
+from brakecli.views.plots.branch import _MARKERS
 from tests.campaign import campaign
 from tests.commands import ROOT
-from tests.sweeps.helpers import inline
+from tests.studies.sweeps.helpers import inline
 
 REMEDY = "run make tables, which writes what is declared; write the others into the page"
 

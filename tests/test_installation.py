@@ -17,6 +17,6 @@ def test_what_commands_import_late_is_among_what_is_imported_once() -> None:
         "h5py",
         "matplotlib.figure",
         "brakecli.cli.run",
-        "brakecli.plots.curves",
+        "brakecli.views.plots.curves",
         "rich",
     } <= imports.names()

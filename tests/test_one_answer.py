@@ -8,14 +8,14 @@ import pytest
 import tomli_w
 
 import brakecli
+from brakecli.analysis.branches.line import Line
+from brakecli.analysis.branches.sliding import Sliding
 from brakecli.analysis.stability.report import stability
-from brakecli.branches.line import Line
-from brakecli.branches.sliding import Sliding
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.scattering.eigen import answer_of
-from brakecli.sweeps.critical import search
-from brakecli.sweeps.tables import Critical
+from brakecli.studies.scattering.eigen import answer_of
+from brakecli.studies.sweeps.critical import search
+from brakecli.studies.sweeps.tables import Critical
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
 from tests.examples import make

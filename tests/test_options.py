@@ -9,9 +9,9 @@ import pytest
 import typer
 
 import brakecli
+from brakecli.api.options import Description, takes
 from brakecli.cli.options import Quiet, with_options
 from brakecli.errors import UsageError
-from brakecli.front.options import Description, takes
 from tests.commands import ROOT
 
 CASE = ROOT / "cases" / "damped.toml"

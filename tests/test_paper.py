@@ -10,20 +10,20 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from brakecli.analysis.branches.line import Line
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.modes import crossings, growth, stiffness_matrix
 from brakecli.analysis.stability.report import stability
-from brakecli.branches.line import Line
+from brakecli.api.inputs import load_sweep
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.front.inputs import load_sweep
 from brakecli.solver.roughness import TWO_PI
-from brakecli.sweeps.critical import search
-from brakecli.sweeps.plan import kind_of
-from brakecli.sweeps.simulate import simulate
-from brakecli.sweeps.tables import Critical
-from brakecli.sweeps.windows import Outcome, Search
+from brakecli.studies.sweeps.critical import search
+from brakecli.studies.sweeps.plan import kind_of
+from brakecli.studies.sweeps.simulate import simulate
+from brakecli.studies.sweeps.tables import Critical
+from brakecli.studies.sweeps.windows import Outcome, Search
 from tests.campaign import campaign, differences, statistics
 from tests.commands import ROOT
 

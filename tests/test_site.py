@@ -6,7 +6,7 @@ from urllib.parse import unquote, urlsplit
 
 from tests.campaign import campaign
 from tests.commands import ROOT
-from tests.reports.browser import browser
+from tests.views.reports.browser import browser
 
 PAGES = sorted((ROOT / "docs" / "_site" / "html").glob("*.html"))
 CUT = """[...document.querySelectorAll("table, pre, math, img")].filter(each => {

@@ -16,16 +16,16 @@ from scipy.linalg import expm
 from brakecli.analysis.stability.modes import eigensystem
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.comparison.compare import errors
 from brakecli.errors import RefusedError
-from brakecli.runs.limits import check, refuse, within_range
-from brakecli.runs.plausible import implausible
-from brakecli.runs.tolerance import certify
 from brakecli.solver.integrate import Work, solve
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.quantities import HISTORY, Failure
 from brakecli.solver.schedules import values
 from brakecli.solver.system import System
+from brakecli.studies.comparison.compare import errors
+from brakecli.studies.runs.limits import check, refuse, within_range
+from brakecli.studies.runs.plausible import implausible
+from brakecli.studies.runs.tolerance import certify
 
 Rows = NDArray[np.float64]
 Tables = dict[str, dict[str, Any]]

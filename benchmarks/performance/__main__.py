@@ -33,9 +33,9 @@ from benchmarks.performance.matching import (
 )
 from benchmarks.performance.page import Goal, number
 from benchmarks.performance.problem import Problem
-from brakecli.runs.tolerance import certify
 from brakecli.solver.method import Method
 from brakecli.solver.system import System
+from brakecli.studies.runs.tolerance import certify
 
 CASES = {"S": "smooth surfaces", "B": "rough surfaces, pad partly open", "C": "stick-slip"}
 DURATIONS = (0.02, 0.5)

@@ -16,12 +16,12 @@ from numba import njit, prange, set_num_threads
 from benchmarks.performance import peers
 from benchmarks.performance.matching import Entry, Floats
 from benchmarks.performance.problem import Problem
+from brakecli.api.inputs import load_sweep
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.front.inputs import load_sweep
-from brakecli.sweeps.driver import choose_engine, sweep
-from brakecli.sweeps.plan import LoadedSweep
-from brakecli.sweeps.point import compute
+from brakecli.studies.sweeps.driver import choose_engine, sweep
+from brakecli.studies.sweeps.plan import LoadedSweep
+from brakecli.studies.sweeps.point import compute
 
 CASES = Path(__file__).parents[2] / "cases"
 B = CASES / "accuracy" / "B.toml"

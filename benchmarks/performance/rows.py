@@ -14,16 +14,16 @@ import numpy as np
 
 from benchmarks.performance import ensembles
 from benchmarks.performance.matching import Entry, cheapest, loop
+from brakecli.api.inputs import load_sweep
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.front.inputs import load_sweep
-from brakecli.runs.tolerance import certify
 from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import NUMEROV
 from brakecli.solver.system import System
-from brakecli.sweeps.point import compute
+from brakecli.studies.runs.tolerance import certify
+from brakecli.studies.sweeps.point import compute
 
 CASES = ensembles.CASES
 RELAXATION = ensembles.CASES / "relaxation.toml"

@@ -9,8 +9,8 @@ from benchmarks.statistics.cases import Drawn, draw
 from benchmarks.statistics.reference import SHARE, reference
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.runs.together import certify_together
-from brakecli.runs.tolerance import certify
+from brakecli.studies.runs.together import certify_together
+from brakecli.studies.runs.tolerance import certify
 
 BETTER = 10.0  # the reference is at least so much better than the promise
 

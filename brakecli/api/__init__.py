@@ -1,19 +1,12 @@
-"""`import brakecli`: cases in, xarray objects out, as on the command line. Large imports wait for a call."""
+"""What can be asked, in the shell and in Python.
 
-from brakecli.api.cases import advise, branch, run, stability
-from brakecli.api.many import scatter, sweep
-from brakecli.api.results import classify, diff, load, plot, report
+`records` has the options of each command, a record each, with what is said of them; `options` makes docstrings
+and signatures of these. `commands` computes what a command is asked, by its record: the shell prints it, Python
+returns it.
 
-__all__ = [
-    "advise",
-    "branch",
-    "classify",
-    "diff",
-    "load",
-    "plot",
-    "report",
-    "run",
-    "scatter",
-    "stability",
-    "sweep",
-]
+`cases`, `many` and `results` are the functions of `import brakecli`, which return xarray objects; `calls` is
+what is around each of them. `given` reads what options hold, `inputs` files, `measured` how a signal was
+measured, `verdict` says what a file shows, and `progress` how far long work has come.
+
+`cli` is above: one file for each command, which prints.
+"""

@@ -14,7 +14,7 @@ from brakecli.faces import in_python
 from brakecli.stop import signals_shown
 
 if TYPE_CHECKING:
-    from brakecli.front.records import Counter, Result
+    from brakecli.api.records import Counter, Result
     from brakecli.solver.integrate import Counted
 
 
@@ -24,8 +24,8 @@ def called() -> Iterator[None]:
 
     Objects of xarray have the accessor from then on. Profiles that are arrays are forgotten at the end.
     """
-    import brakecli.accessor  # noqa: F401
-    from brakecli.case.roughness import arrays
+    import brakecli.views.accessor  # noqa: F401
+    from brakecli.case.profile import arrays
 
     hears = threading.current_thread() is threading.main_thread()
     before = arrays.set({})
@@ -46,7 +46,7 @@ def telling_to(progress: "Counter") -> Iterator["Counted"]:
 
     What the function of the caller raises comes out of the block as it was raised.
     """
-    from brakecli.front.progress import telling
+    from brakecli.api.progress import telling
 
     if not callable(progress):
         with telling(not progress, first_line=1.0) as tell:
@@ -85,7 +85,7 @@ def as_files(results: "Iterable[Result]", *names: str) -> Iterator[list[Path]]:
     """Results as files: their own, or for those in memory one of these names, which goes with the block."""
     import xarray as xr
 
-    from brakecli.files.as_xarray import stored
+    from brakecli.results.as_xarray import stored
 
     with ExitStack() as stack:
         files = list[Path]()

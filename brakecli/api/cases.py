@@ -3,20 +3,20 @@
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli import commands
+from brakecli.api import commands
 from brakecli.api.calls import as_files, called, target, telling_to, warn
-from brakecli.commands import slips_in
+from brakecli.api.commands import slips_in
+from brakecli.api.given import case_of, ends_of
+from brakecli.api.options import takes
+from brakecli.api.records import Advise, Branch, Run, Stability
 from brakecli.errors import BrakecliError, UsageError
-from brakecli.front.given import case_of, ends_of
-from brakecli.front.options import takes
-from brakecli.front.records import Advise, Branch, Run, Stability
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
 
     import xarray as xr
 
-    from brakecli.accessor import Advice
+    from brakecli.views.accessor import Advice
 
 
 @takes(Run)
@@ -37,8 +37,8 @@ def run(options: Run) -> "xr.DataTree":
     """
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.files.as_xarray import opened
-        from brakecli.runs.run import run
+        from brakecli.results.as_xarray import opened
+        from brakecli.studies.runs.run import run
 
         report = run(loaded, path, force=options.force, progress=tell)
         warn(report.warnings)
@@ -64,15 +64,15 @@ def stability(options: Stability) -> "xr.Dataset":
     """
     with called(), telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.files.as_xarray import dataset, opened
-        from brakecli.files.stability_fields import STABILITY, THRESHOLDS
+        from brakecli.results.as_xarray import dataset, opened
+        from brakecli.results.stability_fields import STABILITY, THRESHOLDS
 
         warn(slips_in(loaded))
         if options.vary is None:
             if options.output is not None:
                 raise UsageError("output: holds what vary finds; give vary, or leave output out")
             return dataset((*STABILITY, *THRESHOLDS), commands.stability_of(loaded, tell, options.pushes))
-        from brakecli.sweeps.lock_in import write
+        from brakecli.studies.sweeps.lock_in import write
 
         found = commands.modes_along(loaded, options.vary, tell)
         if options.output is not None:
@@ -100,9 +100,9 @@ def branch(options: Branch) -> "xr.DataTree":
     """
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.files.as_xarray import opened
-        from brakecli.runs.branch import write
-        from brakecli.sweeps.result import unit
+        from brakecli.results.as_xarray import opened
+        from brakecli.studies.runs.branch import write
+        from brakecli.studies.sweeps.result import unit
 
         keys, _, _ = ends_of(options.parameter)
         start: Any = options.start
@@ -133,7 +133,7 @@ def advise(options: Advise) -> "Advice":
     """
     with called(), telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.accessor import Advice
+        from brakecli.views.accessor import Advice
 
         report, warnings = commands.advise(loaded, options, tell, in_caller=True)
         warn(warnings)

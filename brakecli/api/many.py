@@ -3,11 +3,11 @@
 import json
 from typing import TYPE_CHECKING
 
-from brakecli import commands
+from brakecli.api import commands
 from brakecli.api.calls import called, target, telling_to, warn
-from brakecli.front.given import refuse_jobs
-from brakecli.front.options import takes
-from brakecli.front.records import Scatter, Sweep
+from brakecli.api.given import refuse_jobs
+from brakecli.api.options import takes
+from brakecli.api.records import Scatter, Sweep
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -28,9 +28,9 @@ def sweep(options: Sweep) -> "xr.Dataset":
     """
     refuse_jobs(options.jobs)
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
-        from brakecli.files import fields
-        from brakecli.files.as_xarray import opened
-        from brakecli.files.field import values_of
+        from brakecli.results import fields
+        from brakecli.results.as_xarray import opened
+        from brakecli.results.field import values_of
 
         report = commands.sweep(options, path, tell, in_caller=True)
         warn(report.notes)
@@ -61,7 +61,7 @@ def scatter(options: Scatter) -> "xr.Dataset":
     """
     refuse_jobs(options.jobs)
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
-        from brakecli.files.as_xarray import opened
+        from brakecli.results.as_xarray import opened
 
         _, warnings = commands.scatter(options, path, tell, in_caller=True)
         warn(warnings)

@@ -4,19 +4,19 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli import commands
+from brakecli.api import commands
 from brakecli.api.calls import as_files, called, target, telling_to, warn
+from brakecli.api.given import overrides, path_of
+from brakecli.api.options import docstring, takes
+from brakecli.api.records import Classify, Diff, Plot, Report
 from brakecli.errors import UsageError
-from brakecli.front.given import overrides, path_of
-from brakecli.front.options import docstring, takes
-from brakecli.front.records import Classify, Diff, Plot, Report
 
 if TYPE_CHECKING:
     import xarray as xr
     from matplotlib.figure import Figure
 
-    from brakecli.accessor import Differences
-    from brakecli.front.records import Changes, Counter, File, Result
+    from brakecli.api.records import Changes, Counter, File, Result
+    from brakecli.views.accessor import Differences
 
 
 def load(source: "File", settings: "Changes | None" = None) -> Any:
@@ -30,14 +30,14 @@ def load(source: "File", settings: "Changes | None" = None) -> Any:
         CaseError: the case or a setting is wrong; holds every problem.
         UnreadableResultError: the result is damaged or of another program.
     """
-    from brakecli.front.inputs import is_result, kind_of_file, load_case, load_study, load_sweep
+    from brakecli.api.inputs import is_result, kind_of_file, load_case, load_study, load_sweep
 
     name = path_of(source)
     with called():
         if is_result(name):
             if settings:
                 raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
-            from brakecli.files.as_xarray import opened
+            from brakecli.results.as_xarray import opened
 
             return opened(Path(name))
         kinds: dict[str, Callable[[str, list[str]], Any]] = {"sweep": load_sweep, "study": load_study}
@@ -58,9 +58,9 @@ def classify(options: Classify) -> "xr.Dataset":
     Raises:
         UsageError, UnreadableResultError: as `brakecli classify`.
     """
-    from brakecli.files.as_xarray import dataset
-    from brakecli.files.fields import DYING, EXPONENT, UNIT, VERDICT
-    from brakecli.front.verdict import verdict_on
+    from brakecli.api.verdict import verdict_on
+    from brakecli.results.as_xarray import dataset
+    from brakecli.results.fields import DYING, EXPONENT, UNIT, VERDICT
 
     with called(), as_files([options.source], "result") as (file,):
         numbers = verdict_on(str(file), options)
@@ -118,8 +118,8 @@ def report(
         telling_to(progress) as tell,
         as_files(results, "result") as files,
     ):
-        from brakecli.reports.page import write_report
-        from brakecli.runs.limits import within_range
+        from brakecli.studies.runs.limits import within_range
+        from brakecli.views.reports.page import write_report
 
         with within_range():
             return write_report(files, path, full=full, force=force, progress=tell)
@@ -147,7 +147,7 @@ def diff(options: Diff) -> "Differences":
         target(options.output) as path,
         as_files([options.first, options.second], "a", "b") as files,
     ):
-        from brakecli.accessor import Differences
+        from brakecli.views.accessor import Differences
 
         found = commands.diff(options, files[0], files[1], None if options.output is None else path)
         return Differences(**vars(found))

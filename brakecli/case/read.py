@@ -17,13 +17,14 @@ from pydantic import ValidationError
 
 from brakecli.case import wording
 from brakecli.case.case import Case, changed, resolved_toml
-from brakecli.case.roughness import Record, Records, arrays, reading
+from brakecli.case.profile import Record, arrays
+from brakecli.case.roughness import Records, reading
 from brakecli.case.tables import MISSING, OverCase, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 from brakecli.faces import argument
-from brakecli.files import toml_lines
-from brakecli.files.opening import SIGNATURE, opened
-from brakecli.files.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
+from brakecli.results import toml_lines
+from brakecli.results.opening import SIGNATURE, opened
+from brakecli.results.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 
 _Table = TypeVar("_Table", bound=Table)
 _OverCase = TypeVar("_OverCase", bound=OverCase)

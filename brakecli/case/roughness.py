@@ -6,32 +6,24 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 from pydantic import Field
 
 from brakecli.case import tables
+from brakecli.case.profile import MOST_MEASURED, Record, read
 from brakecli.case.tables import MOST_SINES, SMALLEST, NonNegative, Positive, Table, Weight, described, quantity
 from brakecli.errors import Problem, UsageError
 
 if TYPE_CHECKING:
     from brakecli.solver.roughness import Surface
 
-MOST_MEASURED = 2.5e8  # bytes of all measured profiles of a case or sweep, which travel to every worker
 NEEDLESS = {
     **dict.fromkeys(("amplitudes", "wavelengths", "wavenumbers", "orders"), ("note",)),
     **dict.fromkeys(("profile", "spectrum"), ("note", "phases_deg")),
 }
 """Keys of a surface that an override of one replaces, beside those that exclude each other."""
 _SINES = ("amplitudes", "wavelengths", "wavenumbers", "orders", "phases_deg")
-
-
-class Record(NamedTuple):
-    """A measured profile: rising places (m, or rad if `is_angle`) and heights (m), each as bytes of float64."""
-
-    place: bytes
-    height: bytes
-    is_angle: bool
 
 
 class Records(dict[str, Record]):
@@ -44,8 +36,6 @@ class Records(dict[str, Record]):
 
     def __missing__(self, path: str) -> Record:
         """Read a profile, which other names of its file then have in common."""
-        from brakecli.case.profile import read
-
         file = os.path.realpath(path)
         self[path] = self._files[file] = found = self._files.get(file) or read(Path(file))
         if sum(2 * len(each.place) for each in {*self.values()}) > MOST_MEASURED:
@@ -55,8 +45,6 @@ class Records(dict[str, Record]):
 
 
 _known = ContextVar[Mapping[str, Record]]("measured profiles")
-
-arrays = ContextVar[dict[str, Record]]("measured profiles that come from no file, by their names")
 
 
 @contextmanager

@@ -1,19 +1,15 @@
 """From a case to the numbers that the solver works on."""
 
-from functools import lru_cache
-
 from brakecli.case.case import Case
 from brakecli.case.parts import SETTLED
 from brakecli.case.roughness import surface_of
+from brakecli.case.schedules import belt_of, load_of
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import Method
 from brakecli.solver.roughness import surface, turned
-from brakecli.solver.schedules import schedule
 from brakecli.solver.system import Initial, System
 
 _SMOOTH = surface()
-_shared = lru_cache(maxsize=4096)(schedule)
-"""Schedules that the points of a sweep have in common; nobody changes them, nor surfaces."""
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
 FIRST_CYCLES = 250.0
 FIRST_SAMPLES = 500_000.0
@@ -39,8 +35,8 @@ def system_of(case: Case) -> System:
     rough = shoe.g.size or wheel_surface.g.size  # where a tolerance may change the scheme
     return System(
         coefficients=case.coefficients,
-        belt=_shared(wheel.times or (0.0,), wheel.angular_speeds or (wheel.angular_speed or 0.0,), wheel.radius),
-        load=_shared(load.times or (0.0,), load.forces or (load.force or 0.0,)),
+        belt=belt_of(wheel),
+        load=load_of(load),
         shoe=shoe,
         wheel=wheel_surface,
         radius=wheel.radius,

@@ -2,12 +2,12 @@
 
 from functools import partial
 
+from brakecli.api.commands import advise
+from brakecli.api.given import case_of
+from brakecli.api.progress import telling
+from brakecli.api.records import Advise
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.commands import advise
-from brakecli.front.given import case_of
-from brakecli.front.progress import telling
-from brakecli.front.records import Advise
 
 
 @with_options

@@ -15,10 +15,10 @@ import typer
 from typer.core import TyperGroup
 
 from brakecli.about import __released__, __version__
+from brakecli.api.progress import say
 from brakecli.cli.output import announce_compilation, show, showing_compilation, warn
 from brakecli.errors import BrakecliError, RefusedError
 from brakecli.faces import as_argument
-from brakecli.front.progress import say
 from brakecli.solver import compiling
 
 GROUPS = {

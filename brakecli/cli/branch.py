@@ -5,14 +5,14 @@ from functools import partial
 from pathlib import Path
 from typing import cast
 
+from brakecli.api.commands import explorer_of, slips_in
+from brakecli.api.given import case_of, ends_of
+from brakecli.api.inputs import result_path
+from brakecli.api.progress import telling
+from brakecli.api.records import Branch
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.commands import explorer_of, slips_in
-from brakecli.files.os_signals import lastly, signals_deferred
-from brakecli.front.given import case_of, ends_of
-from brakecli.front.inputs import result_path
-from brakecli.front.progress import telling
-from brakecli.front.records import Branch
+from brakecli.results.os_signals import lastly, signals_deferred
 from brakecli.stop import hide_signals
 
 
@@ -22,11 +22,11 @@ def command(options: Branch, details: Details = False, as_json: AsJson = False, 
     keys, _, _ = ends_of(options.parameter)
     loaded = case_of(options.case, options.settings)
     target = result_path(options.output, options.case) if options.output is not None else None
-    from brakecli.files.field import values_of
-    from brakecli.files.stability_fields import BRANCH
-    from brakecli.files.write import new_result
-    from brakecli.runs.branch import write
-    from brakecli.sweeps.result import unit
+    from brakecli.results.field import values_of
+    from brakecli.results.stability_fields import BRANCH
+    from brakecli.results.write import new_result
+    from brakecli.studies.runs.branch import write
+    from brakecli.studies.sweeps.result import unit
     from brakecli.views.stability import of_branch
 
     with telling(quiet) as tell:

@@ -6,12 +6,12 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
+from brakecli.api.given import case_of, overrides, study_of
+from brakecli.api.inputs import kind_of_file, load_sweep
+from brakecli.api.options import Description
+from brakecli.api.records import Settings
 from brakecli.cli.options import AsJson, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.front.given import case_of, overrides, study_of
-from brakecli.front.inputs import kind_of_file, load_sweep
-from brakecli.front.options import Description
-from brakecli.front.records import Settings
 
 OF_SYSTEM = ("belt_speed", "contact_stiffness", "natural_frequencies", "passing_frequency", "evaluator", "nodes")
 
@@ -35,9 +35,9 @@ def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> No
         return
     if kind == "sweep":
         sweep = load_sweep(options.file, overrides(options.settings))
-        from brakecli.runs.limits import free_bytes
-        from brakecli.sweeps.driver import crew
-        from brakecli.sweeps.size import refuse_sweep, size_of
+        from brakecli.studies.runs.limits import free_bytes
+        from brakecli.studies.sweeps.driver import crew
+        from brakecli.studies.sweeps.size import refuse_sweep, size_of
         from brakecli.views.file import of_size
 
         size = size_of(sweep.plan, crew(sweep.plan), spare=True)
@@ -49,7 +49,7 @@ def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> No
         return
     loaded = case_of(options.file, options.settings)
     from brakecli.case.system import system_of
-    from brakecli.runs.limits import check, free_bytes, refuse, within_range
+    from brakecli.studies.runs.limits import check, free_bytes, refuse, within_range
     from brakecli.views.file import of_check
 
     with within_range():
@@ -66,9 +66,9 @@ def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> No
 
 def _check_study(options: Check, *, as_json: bool, quiet: bool) -> None:
     loaded = study_of(options.file, options.settings)
-    from brakecli.runs.limits import free_bytes
-    from brakecli.scattering.scatter import draw, size_of_study
-    from brakecli.sweeps.size import refuse_sweep
+    from brakecli.studies.runs.limits import free_bytes
+    from brakecli.studies.scattering.scatter import draw, size_of_study
+    from brakecli.studies.sweeps.size import refuse_sweep
     from brakecli.views.file import of_study_size
 
     study = loaded.study

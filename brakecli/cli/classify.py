@@ -5,11 +5,11 @@ from typing import Annotated, cast
 
 import typer
 
+from brakecli.api.records import Classify
+from brakecli.api.verdict import verdict_on
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import UnreadableResultError, UsageError
-from brakecli.front.records import Classify
-from brakecli.front.verdict import verdict_on
 
 _NO_SECOND = "there is none any more: every verdict asks what the motion comes to without the waves; leave it out"
 

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from brakecli.api.given import case_of
+from brakecli.api.inputs import result_path
+from brakecli.api.options import Description
+from brakecli.api.progress import telling
+from brakecli.api.records import Case, Force, Settings, target
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result
-from brakecli.front.given import case_of
-from brakecli.front.inputs import result_path
-from brakecli.front.options import Description
-from brakecli.front.progress import telling
-from brakecli.front.records import Case, Force, Settings, target
 from brakecli.solver.schemes import SCHEMES
 
 
@@ -39,11 +39,11 @@ def command(
     """Compare all schemes by error and cost; recommend one."""
     loaded = case_of(options.case, options.settings)
     target = result_path(options.output, options.case, ending="-schemes.h5")
-    from brakecli.comparison.compare import compare
-    from brakecli.comparison.methods import parse_schemes, parse_steps
-    from brakecli.comparison.result import ComparisonReport, write
-    from brakecli.files.write import new_result
-    from brakecli.runs.run import load_kernels
+    from brakecli.results.write import new_result
+    from brakecli.studies.comparison.compare import compare
+    from brakecli.studies.comparison.methods import parse_schemes, parse_steps
+    from brakecli.studies.comparison.result import ComparisonReport, write
+    from brakecli.studies.runs.run import load_kernels
     from brakecli.views.points import of_comparison
 
     schemes = parse_schemes(options.schemes)

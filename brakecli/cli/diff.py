@@ -3,17 +3,17 @@
 from functools import partial
 from pathlib import Path
 
+from brakecli.api.commands import diff
+from brakecli.api.records import Diff
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result
-from brakecli.commands import diff
-from brakecli.front.records import Diff
 
 
 @with_options
 def command(options: Diff, details: Details = False, as_json: AsJson = False, quiet: Quiet = False) -> None:
     """How two results differ: case, numbers, curves."""
-    from brakecli.files.contents import DIFFERENCE_OF_TWO
-    from brakecli.files.field import values_of
+    from brakecli.results.contents import DIFFERENCE_OF_TWO
+    from brakecli.results.field import values_of
     from brakecli.views.file import of_difference
 
     target = None if options.output is None else Path(options.output)

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from brakecli.api.inputs import result_path
+from brakecli.api.options import Description
+from brakecli.api.progress import telling
+from brakecli.api.records import Force, target
 from brakecli.cli.options import Quiet, with_options
 from brakecli.cli.output import show, warn
-from brakecli.front.inputs import result_path
-from brakecli.front.options import Description
-from brakecli.front.progress import telling
-from brakecli.front.records import Force, target
 
 
 @dataclass(frozen=True)
@@ -45,8 +45,8 @@ class Export:
 @with_options
 def command(options: Export, quiet: Quiet = False) -> None:
     """Write numbers as CSV, or a motion as sound."""
-    from brakecli.files.export import Part, export
-    from brakecli.files.read import open_result
+    from brakecli.results.export import Part, export
+    from brakecli.results.read import open_result
 
     target = result_path(options.output, options.result, ending=".csv")
     start = -math.inf if options.start is None else options.start

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
+from brakecli.api.options import Description
 from brakecli.cli.check import command as check
 from brakecli.cli.options import AsJson, with_options
 from brakecli.cli.output import show_result
-from brakecli.front.options import Description
 
 
 @dataclass(frozen=True)
@@ -26,9 +26,9 @@ def command(options: Info, as_json: AsJson = False) -> None:
     if file == "-" or Path(file).suffix == ".toml":
         check(file=file, settings=None, as_json=as_json, quiet=False)
         return
-    from brakecli.files.contents import INFO, contents
-    from brakecli.files.field import values_of
-    from brakecli.files.read import open_result
+    from brakecli.results.contents import INFO, contents
+    from brakecli.results.field import values_of
+    from brakecli.results.read import open_result
     from brakecli.views.file import of_info
 
     with open_result(Path(file)) as stored:

@@ -5,12 +5,12 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Annotated
 
+from brakecli.api.options import Description
+from brakecli.api.records import Force, target
 from brakecli.cli.options import Quiet, with_options
 from brakecli.cli.output import show, warn
 from brakecli.errors import UsageError, printable
 from brakecli.faces import as_argument
-from brakecli.front.options import Description
-from brakecli.front.records import Force, target
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ def command(options: New, quiet: Quiet = False) -> None:
     """Write a commented case that runs, also of your own brake."""
     from brakecli.analysis.similar import Brake, similar
     from brakecli.case.read import starters
-    from brakecli.files.atomic import new_output
+    from brakecli.results.atomic import new_output
     from brakecli.views.terminal import grid
 
     texts = starters()
@@ -85,7 +85,7 @@ def command(options: New, quiet: Quiet = False) -> None:
         if of_brake:
             show(of_brake.sentence)
     if of_brake:
+        from brakecli.api.commands import slips_in
         from brakecli.case.read import parse_case
-        from brakecli.commands import slips_in
 
         warn(*slips_in(parse_case(text, str(path))))

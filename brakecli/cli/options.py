@@ -7,8 +7,8 @@ from typing import Annotated, Any
 
 import typer
 
+from brakecli.api.options import Description, described
 from brakecli.cli.output import warn
-from brakecli.front.options import Description, described
 from brakecli.solver import compiling
 
 

@@ -6,8 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
-from brakecli.files.os_signals import Styled
-from brakecli.front.progress import say, telling
+from brakecli.api.progress import say, telling
+from brakecli.results.os_signals import Styled
 
 if TYPE_CHECKING:
     from brakecli.views.render import Renderer

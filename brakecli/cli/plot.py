@@ -2,13 +2,13 @@
 
 from pathlib import Path
 
+from brakecli.api.commands import plot
+from brakecli.api.inputs import COMMANDS, kind_of_file
+from brakecli.api.records import Plot
 from brakecli.cli.options import Quiet, with_options
 from brakecli.cli.output import show, warn
-from brakecli.commands import plot
 from brakecli.errors import UsageError
 from brakecli.faces import as_argument
-from brakecli.front.inputs import COMMANDS, kind_of_file
-from brakecli.front.records import Plot
 
 
 @with_options

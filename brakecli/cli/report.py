@@ -2,17 +2,17 @@
 
 from pathlib import Path
 
+from brakecli.api.progress import telling
+from brakecli.api.records import Report
 from brakecli.cli.options import Quiet, with_options
 from brakecli.cli.output import show
-from brakecli.front.progress import telling
-from brakecli.front.records import Report
 
 
 @with_options
 def command(options: Report, quiet: Quiet = False) -> None:
     """Put results on one page, answer first (needs jinja2)."""
-    from brakecli.reports.page import write_report
-    from brakecli.runs.limits import within_range
+    from brakecli.studies.runs.limits import within_range
+    from brakecli.views.reports.page import write_report
 
     target = Path(options.output or "report.html")
     with telling(quiet) as tell, within_range():

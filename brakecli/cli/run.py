@@ -2,13 +2,13 @@
 
 from functools import partial
 
+from brakecli.api.given import case_of
+from brakecli.api.inputs import result_path
+from brakecli.api.progress import say, telling
+from brakecli.api.records import Run
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
-from brakecli.front.given import case_of
-from brakecli.front.inputs import result_path
-from brakecli.front.progress import say, telling
-from brakecli.front.records import Run
 
 
 @with_options
@@ -16,7 +16,7 @@ def command(options: Run, details: Details = False, as_json: AsJson = False, qui
     """Simulate one case; write motion and regime to HDF5."""
     loaded = case_of(options.case, options.settings)
     target = result_path(options.output, options.case)
-    from brakecli.runs.run import load_kernels, origin, run
+    from brakecli.studies.runs.run import load_kernels, origin, run
     from brakecli.views.motion import of_run
 
     load_kernels(loaded)

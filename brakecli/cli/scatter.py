@@ -3,13 +3,13 @@
 from dataclasses import replace
 from functools import partial
 
+from brakecli.api.commands import scatter
+from brakecli.api.given import study_of
+from brakecli.api.inputs import result_path
+from brakecli.api.progress import telling
+from brakecli.api.records import Scatter
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.commands import scatter
-from brakecli.front.given import study_of
-from brakecli.front.inputs import result_path
-from brakecli.front.progress import telling
-from brakecli.front.records import Scatter
 
 
 @with_options
@@ -17,7 +17,7 @@ def command(options: Scatter, details: Details = False, as_json: AsJson = False,
     """How likely brakes squeal whose numbers scatter."""
     loaded = study_of(options.source, options.settings)
     target = result_path(options.output, options.source, kind="study")
-    from brakecli.sweeps.driver import keeping_points
+    from brakecli.studies.sweeps.driver import keeping_points
     from brakecli.views.stability import of_scatter
 
     with telling(quiet) as tell, keeping_points(target):

@@ -3,10 +3,10 @@
 from dataclasses import dataclass
 from typing import Annotated
 
+from brakecli.api.options import Description
 from brakecli.cli.options import with_options
 from brakecli.cli.output import show_json
 from brakecli.errors import UsageError
-from brakecli.front.options import Description
 
 
 @dataclass(frozen=True)
@@ -21,8 +21,8 @@ def command(options: Schema) -> None:
     """Print the JSON Schema of cases, sweeps or studies."""
     from brakecli.case.case import Case
     from brakecli.case.tables import Table, json_schema
-    from brakecli.scattering.study import Study
-    from brakecli.sweeps.tables import Sweep
+    from brakecli.studies.scattering.study import Study
+    from brakecli.studies.sweeps.tables import Sweep
 
     kind = options.kind
     tables: dict[str, type[Table]] = {"case": Case, "sweep": Sweep, "scatter": Study}

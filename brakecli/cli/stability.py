@@ -3,15 +3,15 @@
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
+from brakecli.api.commands import modes_along, slips_in, stability_of
+from brakecli.api.given import axis_of, case_of
+from brakecli.api.inputs import result_path
+from brakecli.api.progress import telling
+from brakecli.api.records import Stability
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.commands import modes_along, slips_in, stability_of
 from brakecli.errors import UsageError
-from brakecli.files.atomic import check_target, new_output
-from brakecli.front.given import axis_of, case_of
-from brakecli.front.inputs import result_path
-from brakecli.front.progress import telling
-from brakecli.front.records import Stability
+from brakecli.results.atomic import check_target, new_output
 
 if TYPE_CHECKING:
     from brakecli.views.render import Renderer
@@ -29,15 +29,15 @@ def command(options: Stability, details: Details = False, as_json: AsJson = Fals
     target = result_path(options.output, options.case, ending=".csv") if options.output is not None else None
     if target is not None:
         check_target(target, "what --vary finds", (".h5", ".csv"))
-    from brakecli.sweeps.result import unit
+    from brakecli.studies.sweeps.result import unit
     from brakecli.views.stability import of_stability
 
     with telling(quiet) as tell:
         numbers = stability_of(loaded, tell, None if axis else options.pushes)
         if axis:
-            from brakecli.files.field import values_of
-            from brakecli.files.stability_fields import LOCK_IN
-            from brakecli.sweeps.lock_in import write
+            from brakecli.results.field import values_of
+            from brakecli.results.stability_fields import LOCK_IN
+            from brakecli.studies.sweeps.lock_in import write
 
             with new_output(target, force=options.force) if target else nullcontext():  # whether it can be written
                 pass

@@ -3,14 +3,14 @@
 from dataclasses import replace
 from functools import partial
 
+from brakecli.api.commands import sweep
+from brakecli.api.given import sweep_of_options
+from brakecli.api.inputs import result_path
+from brakecli.api.progress import say, telling
+from brakecli.api.records import Sweep
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
-from brakecli.commands import sweep
 from brakecli.errors import BrakecliError
-from brakecli.front.given import sweep_of_options
-from brakecli.front.inputs import result_path
-from brakecli.front.progress import say, telling
-from brakecli.front.records import Sweep
 
 
 @with_options
@@ -21,8 +21,8 @@ def command(options: Sweep, details: Details = False, as_json: AsJson = False, q
     """
     loaded = sweep_of_options(options)
     target = result_path(options.output, options.source, kind="sweep")
-    from brakecli.sweeps.driver import keeping_points
-    from brakecli.sweeps.size import Size
+    from brakecli.studies.sweeps.driver import keeping_points
+    from brakecli.studies.sweeps.size import Size
     from brakecli.views.points import of_sweep
 
     def begin(size: Size, resumed: int) -> None:

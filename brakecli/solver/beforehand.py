@@ -6,11 +6,8 @@ here.
 """
 
 import fcntl
-import gc
-import importlib
 import json
 import os
-import pkgutil
 import resource
 import shutil
 import subprocess
@@ -21,7 +18,6 @@ import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from threading import Thread
 from typing import Any
 
 from brakecli.solver import cache_folder, compiling
@@ -41,16 +37,16 @@ PROCESSOR_SECONDS = 150.0
 """Time (s) that one core takes for all kernels, about."""
 _LARGEST = 1_000_000  # bytes of a manifest
 _LARGEST_KERNEL = 100_000_000  # bytes of a file
-_TOTAL = "total"
+TOTAL = "total"
 _STAMP = "stamp.json"  # in the folder of each kernel: its files with their sizes and checksums
 _TRIED = 8_000_000  # bytes that are written for a trial
 _LOCK = "beforehand.lock"
 _PAUSE = 0.2  # s between two looks how far the children are
-_SOLVER = Path(__file__).parent
+SOLVER = Path(__file__).parent
 _START = """
 import json, sys
 sys.path[:] = json.loads(sys.argv[1])
-from brakecli.solver.beforehand import child
+from brakecli.solver.compile_all import child
 child(*sys.argv[2:])
 """
 """What a child runs, in an interpreter that imports nothing but from the places that this process knows."""
@@ -121,7 +117,7 @@ def _made(folder: Path, facts: dict[str, str], lock: int) -> str:
         if not why:
             names = [path.parent.name for path in sorted(folder.glob(f"*/{_STAMP}"))]
             manifest = {"facts": facts, "sources": _stamps(), "names": names}
-            _write(folder / MANIFEST, json.dumps(manifest, indent=1))
+            write(folder / MANIFEST, json.dumps(manifest, indent=1))
         return why
 
 
@@ -133,7 +129,7 @@ def is_sound(place: Path) -> bool:
 def vouch(place: Path) -> None:
     """Write down what a folder holds, whose kernel has just been compiled."""
     files = {str(path.relative_to(place)): _stamp(path) for path in sorted(place.rglob("*.nb?"))}
-    _write(place / _STAMP, json.dumps(files))
+    write(place / _STAMP, json.dumps(files))
 
 
 def emptied(place: Path) -> Path | None:
@@ -173,7 +169,7 @@ def forget(folder: Path) -> None:
 
 def _stamps() -> dict[str, list[int]]:
     """Time and size of each source: Numba compares them."""
-    found = {str(path.relative_to(_SOLVER)): path.stat() for path in sorted(_SOLVER.rglob("*.py"))}
+    found = {str(path.relative_to(SOLVER)): path.stat() for path in sorted(SOLVER.rglob("*.py"))}
     return {name: [status.st_mtime_ns, status.st_size] for name, status in found.items()}
 
 
@@ -194,7 +190,7 @@ def _fits(folder: Path, facts: dict[str, str]) -> bool:
         return False
 
 
-def _write(path: Path, text: str) -> None:
+def write(path: Path, text: str) -> None:
     """Write a file completely or not at all."""
     with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
         file.write(text)
@@ -249,7 +245,7 @@ def _remove(path: Path) -> None:
 def _come(folder: Path) -> tuple[int, int]:
     """How many kernels are there, of how many; 0 where this is not known yet."""
     with suppress(OSError, ValueError):
-        return sum(1 for _ in folder.glob(f"*/{_STAMP}")), int(cache_folder.read(folder / _TOTAL, 20))
+        return sum(1 for _ in folder.glob(f"*/{_STAMP}")), int(cache_folder.read(folder / TOTAL, 20))
     return 0, 0
 
 
@@ -261,7 +257,7 @@ def _places() -> list[str]:
         here = ""
     texts = [place for place in sys.path if isinstance(place, str)]  # Python passes over others
     found = [place for place in texts if place and os.path.isabs(place) and place != here]  # noqa: PTH117
-    root = str(_SOLVER.parent.parent)
+    root = str(SOLVER.parent.parent)
     return found if root in found else [root, *found]
 
 
@@ -318,33 +314,3 @@ def _compiled(folder: Path, tell: compiling.Tell) -> str:
     else:
         why = lines[-1] if lines else f"{done} of {total} could be kept"
     return f"the kernels cannot be compiled beforehand: {why} (found {folder}); {REMEDY}"
-
-
-def _end_with_parent() -> None:
-    """End this process where the one that has started it has ended: its standard input is at its end then."""
-    while os.read(0, 1):
-        pass
-    os._exit(1)
-
-
-def child(where: str, k: str) -> None:
-    """Compile every kernel that no other child has begun with; every other child begins at the end."""
-    compiling.set_alone()
-    gc.disable()  # what is compiled is kept to the end: looking for what is not takes 6 % of the time
-    Thread(target=_end_with_parent, daemon=True).start()
-    folder = Path(where)
-    for module in pkgutil.walk_packages([str(_SOLVER)], "brakecli.solver."):
-        importlib.import_module(module.name)
-    from brakecli.solver import kernels
-
-    if folder != kernels.folder():
-        raise SystemExit(f"the cache is {kernels.folder()}")
-    _write(folder / _TOTAL, str(len(kernels.entries)))
-    for each in kernels.entries[:: -1 if int(k) % 2 else 1]:
-        try:
-            (folder / each.name).mkdir(mode=cache_folder.OURS)
-        except FileExistsError:
-            continue
-        each.load()
-        if not is_sound(folder / each.name):
-            raise SystemExit("no more can be written there")

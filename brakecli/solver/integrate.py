@@ -10,19 +10,19 @@ import numpy as np
 
 from brakecli.solver import contact
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BY_NODES, BY_STEPS
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
-from brakecli.solver.motion.record import BY_NODES, BY_STEPS
 from brakecli.solver.plant import PLANT
 from brakecli.solver.quantities import HISTORY, Failure
 from brakecli.solver.records import COEFFICIENTS, EVENT, GRID, MOST_EVENTS, WEIGHTS, Pair, filled, one
 from brakecli.solver.roughness import turn_wheel
 from brakecli.solver.schedules import Schedule, integral_at, slope_at
 from brakecli.solver.steady_sliding import off_by_nodes, steady_sliding
-from brakecli.solver.steps.loop import advance, take_sample
+from brakecli.solver.steps.loop import advance, load, take_sample
 from brakecli.solver.system import System
 from brakecli.solver.tangent import FEWEST_SAMPLES, MOST_POWERS, Exponent, exponents, seed
 from brakecli.solver.track import Track, follow, tracked
@@ -129,7 +129,7 @@ class Stepping:
         """Put the shoe at its start; raises RefusedError where the way to the end is too long."""
         system.refuse_steps(0.0)
         self.system = system
-        self.scheme = system.scheme
+        self.scheme = load(system.method.scheme)
         self.work = Work()
         self.events = np.zeros((EVENTS, 2))
         drive = system.belt, system.load

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from brakecli.solver.motion.record import BLOCK, EXACT, PURSUIT, RUNGE
+from brakecli.solver.block import BLOCK, EXACT, PURSUIT, RUNGE
 from brakecli.solver.records import (
     COEFFICIENTS,
     COUNTS,

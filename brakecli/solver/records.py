@@ -7,9 +7,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.contact import MOST_KINDS
 
 Pair = tuple[float, float]
+MOST_KINDS = 8
+"""How many kinds of contact a run has counters for."""
 
 
 def record(*floats: str, **others: Any) -> np.dtype[Any]:
@@ -179,7 +180,7 @@ WINDOW = record(
     first=int,  # the tiles that are filled, from this one on
     end=int,
 )
-"""The wheel's surface below the pad and ahead of it, see `solver.heights`."""
+"""The wheel's surface below the pad and ahead of it, see `solver.contact.heights`."""
 
 
 class Weights(NamedTuple):

@@ -105,7 +105,7 @@ class System:
 
     @property
     def window_rows(self) -> int:
-        """Points of the grid of a window to a node, see `solver.heights`; 0 without one."""
+        """Points of the grid of a window to a node, see `solver.contact.heights`; 0 without one."""
         return window_rows(self.wheel, 2.0 * self.half_length / self.nodes) if self.nodes else 0
 
     def refuse_tables(self) -> None:
@@ -139,8 +139,8 @@ class System:
 
     @property
     def scheme(self) -> schemes.SchemeModule:
-        """The scheme's module, whose loop is loaded."""
-        return schemes.load(self.method.scheme)
+        """The scheme's module, for which no kernel is loaded."""
+        return schemes.module_of(self.method.scheme)
 
     @property
     def smooth(self) -> bool:

@@ -17,11 +17,11 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.solver import phases
 from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.energy import Mechanical
 from brakecli.solver.kernels import kernel
-from brakecli.solver.motion import phases
 from brakecli.solver.records import EVENT, MOST_EVENTS, PARTS, Weights
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH, TURN = range(7)

@@ -11,9 +11,9 @@ from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import Row, Table, View, sentence
 
 if TYPE_CHECKING:  # what one command prints need not wait for the modules of the others
-    from brakecli.runs.limits import Check
-    from brakecli.scattering.study import Study
-    from brakecli.sweeps.size import Size
+    from brakecli.studies.runs.limits import Check
+    from brakecli.studies.scattering.study import Study
+    from brakecli.studies.sweeps.size import Size
 
 _ASIDE = ("title", "regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
 _MAIN = ("regime", "frequency", "amplitude", "excitation", "stick_fraction", "contact_loss_fraction", "critical")

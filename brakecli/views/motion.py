@@ -5,8 +5,8 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
-from brakecli.files import fields
-from brakecli.files.field import Field, named
+from brakecli.results import fields
+from brakecli.results.field import Field, named
 from brakecli.solver.contact import EVALUATORS
 from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import Row, Table, View, details, sentence

@@ -12,14 +12,14 @@ import numpy as np
 
 from brakecli.analysis.regime.decision import Regime
 from brakecli.faces import argument
-from brakecli.files import fields
-from brakecli.files.field import Field, named, values_of
+from brakecli.results import fields
+from brakecli.results.field import Field, named, values_of
 from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import SHORT_POINTS, Row, Table, View, details, sentences
 
 if TYPE_CHECKING:
-    from brakecli.sweeps.attractors import Attractor
-    from brakecli.sweeps.result import SweepReport
+    from brakecli.studies.sweeps.attractors import Attractor
+    from brakecli.studies.sweeps.result import SweepReport
 
 POINTS = named(fields.POINT, "regime", "frequency", "amplitude")
 CRITICAL = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, "critical", "critical_error"))
@@ -88,7 +88,7 @@ def _answer(report: SweepReport, show: Renderer) -> list[str]:
 
 def _where(report: SweepReport, critical: float) -> str:
     """The first point that has a critical value, in words; empty where the points are too many."""
-    from brakecli.sweeps.plan import label
+    from brakecli.studies.sweeps.plan import label
 
     variables = report.findings.variables
     plan = report.loaded.plan
@@ -102,7 +102,7 @@ def _where(report: SweepReport, critical: float) -> str:
 
 def _stretches(report: SweepReport) -> list[Row]:
     """Along a single axis: the stretches of equal regimes, where the points are too many to be listed."""
-    from brakecli.sweeps.plan import label
+    from brakecli.studies.sweeps.plan import label
 
     found = report.findings
     axes = report.loaded.plan.sweep.axis
@@ -127,7 +127,7 @@ def _stretches(report: SweepReport) -> list[Row]:
 
 def _points(report: SweepReport, show: Renderer) -> Table:
     """A row for each point: its place on the axes, and what was found there."""
-    from brakecli.sweeps.plan import label
+    from brakecli.studies.sweeps.plan import label
 
     found = report.findings
     plan = report.loaded.plan

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from brakecli.files.field import Field, plain_units
+from brakecli.results.field import Field, plain_units
 
 _UNSAID = ("1", "of the key")  # units that no reader needs
 _PREFIXES = ((9, "G"), (6, "M"), (3, "k"), (0, ""), (-3, "m"), (-6, "µ"), (-9, "n"), (-12, "p"))

@@ -6,14 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from brakecli.analysis.stability.advice import rounded
-from brakecli.files import stability_fields as fields
-from brakecli.files.field import labelled
+from brakecli.results import stability_fields as fields
+from brakecli.results.field import labelled
 from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import SHORT_POINTS, Row, Table, View, details, sentence, sentences
 
 if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change
-    from brakecli.runs.advise import AdviceReport
+    from brakecli.studies.runs.advise import AdviceReport
 
 SHORT_ADVICE = 3
 """Keys to change, and notes, that are shown unless all are asked for."""
@@ -273,7 +273,7 @@ def _special_points(marks: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
 
 def of_scatter(numbers: Mapping[str, Any], title: str) -> View:
     """The answer in a sentence, then distributions, and on demand probabilities and indices."""
-    from brakecli.scattering.answers import SHARES
+    from brakecli.studies.scattering.answers import SHARES
 
     failed = f", {numbers['failed']} without an answer" if numbers["failed"] else ""
     blocks: list[Row | Table] = [Row("samples", f"{numbers['samples']}{failed}")]

@@ -13,11 +13,11 @@ from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.measure import Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
-from brakecli.runs.judge import asked, judged_in_memory
 from brakecli.solver.history import History, array_history
 from brakecli.solver.motion.flow import Orbit
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Events, Track
+from brakecli.studies.runs.judge import asked, judged_in_memory
 
 INTERVAL = 1e-4
 MARKS = 512

@@ -16,9 +16,9 @@ from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.table import decide
 from brakecli.case.read import parse_case
-from brakecli.files.read import open_result
-from brakecli.runs.run import run
+from brakecli.results.read import open_result
 from brakecli.solver.quantities import HISTORY
+from brakecli.studies.runs.run import run
 from tests.analysis.answers import VX, Answer, X, answer, last_eighth, levels, sticks_per_cycle
 from tests.analysis.shoes import Array, Shoe, Tables, random_shoes
 

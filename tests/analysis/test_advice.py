@@ -15,7 +15,7 @@ from brakecli.analysis.stability.modes import Crossing
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase
 from brakecli.errors import UsageError
-from brakecli.runs.advise import AdviceReport, advise
+from brakecli.studies.runs.advise import AdviceReport, advise
 from tests.analysis.shoes import Shoe, random_shoes
 from tests.campaign import campaign, counts
 from tests.examples import MODE_COUPLING, NEVER_STABLE, ROUGH, SQUEAL, make

@@ -7,8 +7,8 @@ from scipy.linalg import eigvals
 from brakecli.analysis.stability.discrete import amplification, step_limits
 from brakecli.case.system import system_of
 from brakecli.errors import RefusedError
-from brakecli.runs.limits import adjustments, check, refuse
 from brakecli.solver.links import natural_frequencies
+from brakecli.studies.runs.limits import adjustments, check, refuse
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
 
 

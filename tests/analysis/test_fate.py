@@ -9,19 +9,19 @@ import pytest
 
 from brakecli.analysis import fate as room
 from brakecli.analysis import rough_fate
+from brakecli.analysis.branches.forced import Forced
+from brakecli.analysis.branches.line import Line
 from brakecli.analysis.fate import Fate, Kind, fate, fate_on_smooth_pads
 from brakecli.analysis.shoe import Shoe
-from brakecli.branches.forced import Forced
-from brakecli.branches.line import Line
 from brakecli.case.system import system_of
 from brakecli.solver.steady_sliding import steady_sliding
+from tests.analysis.branches.phasewise import AHEAD, BEHIND, OPEN, STICK, Phasewise
+from tests.analysis.branches.smooth_shoes import FRICTION, changed, drawn
 from tests.analysis.shoes import Shoe as Drawn
 from tests.analysis.shoes import Tables
-from tests.branches.phasewise import AHEAD, BEHIND, OPEN, STICK, Phasewise
-from tests.branches.smooth_shoes import FRICTION, changed, drawn
 from tests.campaign import campaign
 from tests.examples import SQUEAL, make
-from tests.sweeps.shoes import drawn as rough_drawn
+from tests.studies.sweeps.shoes import drawn as rough_drawn
 
 BUMPS = {"amplitudes": [2e-6], "wavelengths": [0.05]}
 WAVES = {"amplitudes": [2e-5], "wavelengths": [0.03]}

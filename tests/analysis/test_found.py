@@ -13,10 +13,10 @@ from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.report import stability
 from brakecli.case.system import system_of
-from brakecli.runs import judge
 from brakecli.solver.integrate import solve
 from brakecli.solver.quantities import HISTORY, ContactState
-from brakecli.sweeps.early import early
+from brakecli.studies.runs import judge
+from brakecli.studies.sweeps.early import early
 from tests.analysis.found import SHOES
 from tests.analysis.histories import verdict_of
 from tests.analysis.shoes import Shoe, random_shoes

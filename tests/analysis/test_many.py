@@ -11,9 +11,9 @@ from brakecli.analysis.regime.evidence import Part
 from brakecli.analysis.regime.measure import Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
-from brakecli.runs.judge import asked, in_memory
 from brakecli.solver.history import stacked
 from brakecli.solver.integrate import solve
+from brakecli.studies.runs.judge import asked, in_memory
 from tests.analysis.histories import history_of
 from tests.examples import ROUGH, SQUEAL, make
 

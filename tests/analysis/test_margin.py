@@ -6,8 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from brakecli.analysis.margin import Change, Margin, between, between_known, changes, joined, left_open
 from brakecli.analysis.stability.certain import Rounded
+from brakecli.analysis.stability.margin import Change, Margin, between, between_known, changes, joined, left_open
 
 VALUES = np.linspace(0.0, 1.0, 17).tolist()
 

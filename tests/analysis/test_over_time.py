@@ -11,7 +11,7 @@ import xarray as xr
 from brakecli.analysis.over_time import LOUD, over_time
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.files.read import open_result
+from brakecli.results.read import open_result
 from brakecli.solver.history import History, array_history
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.schedules import schedule

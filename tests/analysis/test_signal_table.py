@@ -10,7 +10,7 @@ import pytest
 
 from brakecli.analysis.signals.look import Measurand, Signal, look
 from brakecli.analysis.signals.table import ROWS, SignalAnswers, SignalThresholds, decide
-from brakecli.files.fields import evidence_unit
+from brakecli.results.fields import evidence_unit
 from tests.analysis.measured_signals import Array, clipped, measured, stick_slip
 
 SINE = SignalAnswers(

@@ -11,9 +11,9 @@ from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.read import parse_case, starters
 from brakecli.case.system import system_of
-from brakecli.runs.plausible import implausible
 from brakecli.solver.period import common_period
-from brakecli.sweeps.simulate import simulate
+from brakecli.studies.runs.plausible import implausible
+from brakecli.studies.sweeps.simulate import simulate
 from tests.commands import brakecli
 
 STARTERS = starters()

@@ -14,9 +14,9 @@ from brakecli.analysis.stability.linear import linear_theory, parts
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.runs.judge import given
 from brakecli.solver.history import array_history
 from brakecli.solver.quantities import ContactState
+from brakecli.studies.runs.judge import given
 from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
 from tests.campaign import counts

@@ -9,7 +9,7 @@ import pytest
 
 from brakecli.case.read import parse_case, read_text
 from brakecli.errors import CaseError
-from brakecli.files.toml_lines import LARGEST_STORED, LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
+from brakecli.results.toml_lines import LARGEST_STORED, LARGEST_TEXT, MOST_MARKS, MOST_PARTS, MOST_STATEMENTS
 from tests.case.examples import CONSTANT, change, messages, problems, put
 from tests.commands import SOON, TINY
 

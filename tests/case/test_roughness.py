@@ -14,12 +14,12 @@ from brakecli.case.case import resolved_toml
 from brakecli.case.read import LoadedCase, parse_case, parse_resolved, read_text
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
-from brakecli.runs.limits import adjustments
 from brakecli.solver import roughness
 from brakecli.solver.roughness import Surface
-from brakecli.sweeps.journal import identity
-from brakecli.sweeps.plan import parse_sweep
-from brakecli.sweeps.point import compute
+from brakecli.studies.runs.limits import adjustments
+from brakecli.studies.sweeps.journal import identity
+from brakecli.studies.sweeps.plan import parse_sweep
+from brakecli.studies.sweeps.point import compute
 from tests.case.examples import ORDERS, SMALL, SPECTRA, messages
 
 RADIUS = 0.5  # m, of the wheel of SMALL

@@ -7,7 +7,7 @@ import pytest
 from brakecli.case.parts import BUDGET
 from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
-from brakecli.runs.limits import adjustments
+from brakecli.studies.runs.limits import adjustments
 from tests.case.examples import CONSTANT, EVENT_DRIVEN, change, lines_of, messages, where
 
 RULES = [

@@ -66,7 +66,7 @@ def test_the_table_of_allowed_values_has_every_field() -> None:
         if (*path, key) not in inner
     }
     of_files = {f"{surface}.{key}" for surface in SURFACES for key in ("profile", "profile_error")}
-    of_files |= {"initial.from"}  # test_roughness.py and tests/runs/test_restart.py read files
+    of_files |= {"initial.from"}  # test_roughness.py and tests/studies/runs/test_restart.py read files
     settled = {"solver.budget"}  # not beside a number: test_rules.py
     assert fields - of_files - settled == set(ALLOWED)
 

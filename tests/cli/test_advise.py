@@ -8,7 +8,7 @@ import pytest
 
 from brakecli.analysis.stability.advice import KEYS
 from brakecli.case.read import parse_case, read_text
-from brakecli.runs.advise import advise
+from brakecli.studies.runs.advise import advise
 from brakecli.views.render import TERMINAL
 from brakecli.views.stability import of_advice
 from brakecli.views.terminal import terminal_text

@@ -13,7 +13,7 @@ import pytest
 
 from brakecli.case.read import starters
 from brakecli.cli.app import main
-from brakecli.files.os_signals import guard_streams
+from brakecli.results.os_signals import guard_streams
 from tests.campaign import campaign, counts
 from tests.cli.mutator import mutated, with_another_header
 from tests.cli.test_surroundings import ODD, odd_in

@@ -9,7 +9,7 @@ import pytest
 
 from tests.campaign import campaign
 from tests.commands import SOON, TINY, brakecli, each, left_in, shell, variants
-from tests.files.results import edited
+from tests.results.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
 

@@ -13,22 +13,22 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import brakecli
-from brakecli.branches.explore import Explorer
+from brakecli.analysis.branches.explore import Explorer
+from brakecli.api.inputs import load_case
 from brakecli.errors import UsageError
-from brakecli.files.field import Field, integer
-from brakecli.files.read import open_result
-from brakecli.files.stability_fields import MOTION
-from brakecli.files.write import ResultFile, new_result
-from brakecli.front.inputs import load_case
-from brakecli.plots.branch import _line, _with_ends
-from brakecli.plots.result import draw
-from brakecli.plots.style import BLUE, DARK, VERMILION, applied
-from brakecli.runs.branch import line_of
+from brakecli.results.field import Field, integer
+from brakecli.results.read import open_result
+from brakecli.results.stability_fields import MOTION
+from brakecli.results.write import ResultFile, new_result
+from brakecli.studies.runs.branch import line_of
+from brakecli.views.plots.branch import _line, _with_ends
+from brakecli.views.plots.result import draw
+from brakecli.views.plots.style import BLUE, DARK, VERMILION, applied
 from brakecli.views.render import TERMINAL
 from brakecli.views.stability import of_branch
 from brakecli.views.view import Table
+from tests.analysis.branches.phasewise import Phasewise
 from tests.analysis.shoes import Shoe
-from tests.branches.phasewise import Phasewise
 from tests.campaign import campaign
 from tests.commands import ROOT, environment
 from tests.commands import brakecli as command
@@ -396,7 +396,7 @@ def test_without_dashpots_it_says_that_no_cycle_is_followed(here: Path) -> None:
 
 INTERRUPTED = """
 import os, signal
-from brakecli.branches import explore
+from brakecli.analysis.branches import explore
 
 begin = explore.Explorer.__init__
 
@@ -423,7 +423,7 @@ def test_an_interruption_leaves_a_whole_file_that_ends_in_budget(here: Path) -> 
 
 LOOKING = """
 import os, signal
-from brakecli.branches import sliding
+from brakecli.analysis.branches import sliding
 
 look = sliding.Sliding._at
 
@@ -449,7 +449,7 @@ def test_before_there_is_anything_to_keep_a_signal_ends_the_work_at_once(tmp_pat
 
 BEGINNING = """
 import os, signal, threading
-from brakecli.branches import forced
+from brakecli.analysis.branches import forced
 
 grown = forced.Forced.grown
 

@@ -331,7 +331,8 @@ def test_a_run_waits_for_no_library_that_it_does_not_need(tmp_path: Path) -> Non
     assert {"numba", "h5py", "brakecli.solver.steps.loop"} <= loaded
     unused = {"scipy.signal", "scipy.stats", "scipy.interpolate", "scipy.optimize", "scipy.ndimage"}
     unused |= {"scipy.linalg", "numpy.f2py"}
-    assert loaded.isdisjoint({*unused, "matplotlib", "pint", "brakecli.sweeps", "brakecli.comparison"})
+    unused |= {"matplotlib", "pint", "brakecli.studies.sweeps", "brakecli.studies.comparison"}
+    assert loaded.isdisjoint(unused)
 
 
 def test_a_run_that_keeps_a_tolerance_tells_the_step_that_it_took(tmp_path: Path) -> None:
@@ -347,7 +348,7 @@ def test_vibration_on_smooth_pads_waits_for_no_kernels_of_rough_ones(tmp_path: P
     """Whether it lasts is asked of the flow on smooth pads."""
     loaded = loaded_by(["run", str(ROOT / "cases" / "relaxation.toml"), "--output", "r.h5"], tmp_path)
     assert "brakecli.solver.motion.orbit" in loaded
-    assert loaded.isdisjoint({"brakecli.solver.motion.rough", "brakecli.solver.schemes.event_driven"})
+    assert loaded.isdisjoint({"brakecli.solver.motion.rough", "brakecli.solver.steps.event_driven"})
 
 
 @campaign
@@ -356,8 +357,8 @@ def test_a_sweep_without_a_search_waits_for_no_kernels_of_branches(tmp_path: Pat
     axis = '[[axis]]\nparameter = "load.force"\nvalues = [1000.0, 2000.0]\n'
     (tmp_path / "sweep.toml").write_text(f'case = "tiny.toml"\n{axis}')
     loaded = loaded_by(["sweep", "sweep.toml"], tmp_path)
-    assert {"brakecli.sweeps.point", "brakecli.solver.steps.loop"} <= loaded
-    others = "solver.motion.rough", "solver.schemes.event_driven", "branches.explore"
+    assert {"brakecli.studies.sweeps.point", "brakecli.solver.steps.loop"} <= loaded
+    others = "solver.motion.rough", "solver.steps.event_driven", "analysis.branches.explore"
     assert loaded.isdisjoint(f"brakecli.{name}" for name in others)
 
 

@@ -14,10 +14,10 @@ import pytest
 
 import brakecli as brakecli_in_python
 from brakecli.errors import UsageError
-from brakecli.sweeps import driver
+from brakecli.studies.sweeps import driver
 from tests.campaign import campaign
 from tests.commands import TINY, brakecli, each, ended, forked, lazily, run, started
-from tests.files.results import edited
+from tests.results.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
 

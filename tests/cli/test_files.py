@@ -14,16 +14,16 @@ import pytest
 
 from brakecli.about import __version__
 from brakecli.case.read import parse_case
-from brakecli.files import fields
-from brakecli.files.contents import INFO, Difference, difference
-from brakecli.files.read import open_result
-from brakecli.plots import over_each_other
-from brakecli.runs.run import run
+from brakecli.results import fields
+from brakecli.results.contents import INFO, Difference, difference
+from brakecli.results.read import open_result
+from brakecli.studies.runs.run import run
+from brakecli.views.plots import over_each_other
 from brakecli.views.view import sentence
 from tests.campaign import campaign
 from tests.commands import TINY, attributes, brakecli, each, left_in
-from tests.files.results import edited
-from tests.sweeps.made_up import CYCLE, DAMPED, swept
+from tests.results.results import edited
+from tests.studies.sweeps.made_up import CYCLE, DAMPED, swept
 
 pandas = import_module("pandas")
 pytestmark = pytest.mark.usefixtures("compiled")

@@ -11,16 +11,16 @@ import pytest
 from brakecli.analysis.stability.report import stability
 from brakecli.case.read import parse_case, read_text
 from brakecli.case.system import system_of
-from brakecli.files.field import values_of
-from brakecli.files.stability_fields import LOCK_IN, STABILITY
-from brakecli.sweeps.lock_in import lock_in
-from brakecli.sweeps.tables import Axis
+from brakecli.results.field import values_of
+from brakecli.results.stability_fields import LOCK_IN, STABILITY
+from brakecli.studies.sweeps.lock_in import lock_in
+from brakecli.studies.sweeps.tables import Axis
 from brakecli.views.render import TERMINAL
 from brakecli.views.stability import of_stability
 from brakecli.views.terminal import terminal_text
 from tests.campaign import campaign
 from tests.commands import ROOT, brakecli, each, left_in
-from tests.plots.helpers import panels
+from tests.views.plots.helpers import panels
 
 xarray = import_module("xarray")  # imported so because h5netcdf has no type hints
 

@@ -11,10 +11,10 @@ import pytest
 
 import brakecli
 from brakecli.errors import OtherKindError, UsageError
-from brakecli.files.contents import INFO, contents
-from brakecli.files.field import values_of
-from brakecli.files.read import open_result
-from brakecli.reports import of_run
+from brakecli.results.contents import INFO, contents
+from brakecli.results.field import values_of
+from brakecli.results.read import open_result
+from brakecli.views.reports import of_run
 from tests.campaign import campaign, counts
 from tests.commands import ROOT
 from tests.commands import brakecli as command

@@ -10,7 +10,7 @@ import pytest
 
 from tests.campaign import campaign
 from tests.commands import TINY, Done, brakecli, each, lazily, shell
-from tests.files.results import edited
+from tests.results.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
 

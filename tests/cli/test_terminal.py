@@ -14,11 +14,11 @@ from typing import Any
 
 import pytest
 
+from brakecli.api import progress
 from brakecli.case.read import parse_case, starters
 from brakecli.cli.app import GROUPS
-from brakecli.front import progress
-from brakecli.scattering.study import parse_study
-from brakecli.sweeps.plan import parse_sweep
+from brakecli.studies.scattering.study import parse_study
+from brakecli.studies.sweeps.plan import parse_sweep
 from brakecli.views.motion import of_verdict
 from brakecli.views.render import TERMINAL
 from brakecli.views.terminal import grid, terminal_text
@@ -130,7 +130,7 @@ def test_long_work_without_a_terminal_says_a_line_now_and_then(
 
 def test_a_terminal_is_told_of_work_that_says_nothing_itself() -> None:
     """The process waits until its standard input ends, which is when the words were seen."""
-    work = "import sys; from brakecli.front.progress import telling\nwith telling(False): sys.stdin.read()"
+    work = "import sys; from brakecli.api.progress import telling\nwith telling(False): sys.stdin.read()"
     terminal, stderr = pty.openpty()
     line = [sys.executable, "-c", work]
     with subprocess.Popen(line, stdin=subprocess.PIPE, stderr=stderr, env=environment(TERM="xterm")) as process:

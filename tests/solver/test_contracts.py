@@ -19,11 +19,11 @@ from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import auto, cells, closed_form, exact, midpoint
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.records import PROBLEM, WORK, Weights, new
+from brakecli.solver.records import MOST_KINDS, PROBLEM, WORK, Weights, new
 from brakecli.solver.roughness import surface
-from brakecli.solver.schemes import event_driven, piecewise_exact
-from brakecli.solver.steps import three_layer, two_layer
+from brakecli.solver.steps import event_driven, piecewise_exact, three_layer, two_layer
 from brakecli.solver.steps.implicit import SOLVED, newton
+from brakecli.solver.steps.loop import load
 from tests.solver import small_scheme
 from tests.solver.rough_gap import outputs, unfilled
 
@@ -150,7 +150,7 @@ CONTACTS: list[contact.EvaluatorModule] = [auto, cells, closed_form, exact, midp
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_a_scheme_keeps_the_contract_of_its_kind(name: str) -> None:
-    module = schemes.load(name.replace("_", "-"))
+    module = load(name.replace("_", "-"))
     assert module in [*STEPS, *OWN_STEPS], f"add {name} to STEPS or OWN_STEPS, so that mypy sees it"
     assert isinstance(module, schemes.SchemeModule)
     assert isinstance(module, schemes.SteppingModule) is (module in STEPS) is (name in STEPPING)
@@ -177,7 +177,7 @@ def test_a_module_without_evaluate_is_no_evaluator() -> None:
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
-    scheme: Any = schemes.load(name.replace("_", "-"))
+    scheme: Any = load(name.replace("_", "-"))
     assert scheme.LAG in (0, 1)
     assert set(scheme.VELOCITIES) <= set(scheme.MEMORY) <= set(scheme.STATE.names)
     checked = 0
@@ -192,7 +192,7 @@ def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
 
 @pytest.mark.parametrize("name", SCHEMES)
 def test_a_scheme_starts_at_the_given_state(name: str) -> None:
-    scheme: Any = schemes.load(name.replace("_", "-"))
+    scheme: Any = load(name.replace("_", "-"))
     weights = Weights(1e-5, *(*weights_of(name)[0], 0.0, 0.0, 0.0)[:3])
     state = new(scheme.STATE)
     scheme.begin(weights, state, *START)
@@ -215,7 +215,7 @@ def test_a_scheme_starts_at_the_given_state(name: str) -> None:
 
 @pytest.mark.parametrize("name", STEPPING)
 def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: str) -> None:
-    scheme: Any = schemes.load(name.replace("_", "-"))
+    scheme: Any = load(name.replace("_", "-"))
     checked = 0
     for theta in weights_of(name):
         weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
@@ -247,7 +247,7 @@ def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: 
 
 
 def test_more_evaluators_than_a_run_can_count_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    left = contact.MOST_KINDS - len(contact.kinds())
+    left = MOST_KINDS - len(contact.kinds())
     more = {f"of-a-user-{n}": contact.EVALUATORS["exact"] for n in range(left)}
     monkeypatch.setattr(contact, "EVALUATORS", contact.EVALUATORS | more)
     contact.place_of("of-a-user-0")

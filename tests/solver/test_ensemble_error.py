@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from brakecli.runs.own_error import Known
-from brakecli.runs.together import SAFETY
 from brakecli.solver.arrays import Floats
 from brakecli.solver.ensemble import filled, run_together, shared
 from brakecli.solver.integrate import Motion, solve
@@ -18,6 +16,8 @@ from brakecli.solver.lanes.contact import leave_out, touch
 from brakecli.solver.lanes.records import LANES, Shared
 from brakecli.solver.method import Method
 from brakecli.solver.system import System
+from brakecli.studies.runs.own_error import Known
+from brakecli.studies.runs.together import SAFETY
 from tests.campaign import counts
 from tests.solver.test_ensemble import drawn, system
 from tests.solver.test_ensemble_tangents import TINY, shaken

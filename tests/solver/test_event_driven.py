@@ -13,11 +13,11 @@ from scipy.integrate._ivp import dop853_coefficients as scipy
 from brakecli.analysis.stability.report import stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
-from brakecli.runs.limits import check
 from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.method import Method
 from brakecli.solver.motion.tableaus import DENSE, END_STAGE, ERROR_WEIGHTS, NODES, THIRD, USED, A
 from brakecli.solver.quantities import HISTORY, ContactState, Failure
+from brakecli.studies.runs.limits import check
 from tests.campaign import counts
 from tests.examples import COULOMB, MODE_COUPLING, ROUGH, SQUEAL, Result, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact

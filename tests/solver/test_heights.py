@@ -11,7 +11,6 @@ import pytest
 from scipy.interpolate import BarycentricInterpolator
 
 from brakecli.case.system import system_of
-from brakecli.runs.work import work_of
 from brakecli.solver.contact import pad as pads
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import ContactLayer, Pad, build_layer, build_pad, interpolation_error, window_rows
@@ -19,6 +18,7 @@ from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
 from brakecli.solver.roughness import Surface, surface, turn
 from brakecli.solver.schemes import QUARTERS
+from brakecli.studies.runs.work import work_of
 from tests.examples import ROUGH, make
 from tests.solver.rough_gap import EPS, outputs
 

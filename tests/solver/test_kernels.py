@@ -132,8 +132,8 @@ def test_an_entry_is_loaded_once_by_eight_threads_at_once(tmp_path: Path) -> Non
 RECORDS = """
 import hashlib
 from pathlib import Path
-from brakecli.sweeps.workers.task import compute_units
-from tests.sweeps.test_together import rough
+from brakecli.studies.sweeps.workers.task import compute_units
+from tests.studies.sweeps.test_together import rough
 plan = rough(Path("FOLDER"), 12).plan
 print(hashlib.sha256(compute_units(plan, 0, plan.points)).hexdigest())
 """

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from brakecli.case.system import system_of
-from brakecli.solver import schemes
+from brakecli.solver.steps.loop import load
 from brakecli.solver.system import System
 from tests.examples import SQUEAL, make, simulate
 from tests.solver.piecewise_exact import PiecewiseExact
@@ -91,7 +91,7 @@ def test_order_on_smooth_motion(scheme: str, theta: tuple[float, ...], start: st
     slopes = np.diff(np.log(errors)) / np.diff(np.log(STEPS))
     assert np.polyfit(np.log(STEPS), np.log(errors), 1)[0] == pytest.approx(order, abs=0.15)
     assert slopes[-1] == pytest.approx(order, abs=0.15)
-    assert schemes.load(scheme).order(system.weights, start) == order
+    assert load(scheme).order(system.weights, start) == order
 
 
 def test_velocities_and_forces_of_a_three_layer_scheme_belong_to_their_samples() -> None:

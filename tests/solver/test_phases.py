@@ -2,7 +2,7 @@
 
 import pytest
 
-from brakecli.solver.motion.phases import (
+from brakecli.solver.phases import (
     BACKWARD,
     FORWARD,
     HEIGHT,

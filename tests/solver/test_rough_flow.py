@@ -18,14 +18,14 @@ from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.method import Method
-from brakecli.solver.motion.phases import BACKWARD, FORWARD, STICK
 from brakecli.solver.motion.rough import Flown, RoughFlow, Status, default_steps
 from brakecli.solver.period import common_period
+from brakecli.solver.phases import BACKWARD, FORWARD, STICK
 from brakecli.solver.system import Initial, System
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
 from tests.examples import ROUGH, SQUEAL, make
-from tests.sweeps.shoes import drawn
+from tests.studies.sweeps.shoes import drawn
 
 Array = NDArray[np.float64]
 KINDS: dict[str, Callable[[Flown], bool]] = {  # what a flow may pass through
@@ -134,7 +134,8 @@ def test_the_end_does_not_jump_where_a_kink_passes_into_another_step() -> None:
     Where a derivative rises or falls from D to D' over a stretch d, the end changes by d (D + D')/2, but for at
     most d |D' - D|/2. What is more is a jump, or a derivative of something else.
     """
-    shoe = tomllib.loads((Path(__file__).parents[1] / "sweeps/windows.toml").read_text())["doubling"]["case"]
+    windows = Path(__file__).parents[1] / "studies" / "sweeps" / "windows.toml"
+    shoe = tomllib.loads(windows.read_text())["doubling"]["case"]
     system = system_of(make(shoe, link2__stiffness=3466000.0))
     flow = RoughFlow(system)
     size = scales(system)

@@ -10,12 +10,12 @@ from scipy.linalg import expm
 
 from brakecli.case.system import system_of
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import MOST_SMOOTH_EVENTS
 from brakecli.solver.integrate import solve
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.motion.events import DONE, EVENTFUL
 from brakecli.solver.motion.flow import SmoothFlow
-from brakecli.solver.motion.phases import BACKWARD, FORWARD, HEIGHT, OPEN, SLIDING, STICK
-from brakecli.solver.motion.record import MOST_SMOOTH_EVENTS
+from brakecli.solver.phases import BACKWARD, FORWARD, HEIGHT, OPEN, SLIDING, STICK
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from tests.analysis.shoes import Shoe, random_shoes

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from brakecli.branches.forced import Forced
-from brakecli.branches.line import Line
+from brakecli.analysis.branches.forced import Forced
+from brakecli.analysis.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, Stepping, solve
@@ -21,7 +21,7 @@ from brakecli.solver.tangent import exponents
 from tests.analysis.shoes import Tables, random_shoes
 from tests.campaign import campaign
 from tests.examples import MODE_COUPLING, SQUEAL, make
-from tests.sweeps.shoes import drawn as opening
+from tests.studies.sweeps.shoes import drawn as opening
 
 pytestmark = pytest.mark.usefixtures("compiled")
 Array = Any

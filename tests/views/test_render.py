@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from brakecli.files import fields
-from brakecli.files.field import Field, integer, ratio
-from brakecli.files.stability_fields import SCATTER
-from brakecli.reports.blocks import PAGE
+from brakecli.results import fields
+from brakecli.results.field import Field, integer, ratio
+from brakecli.results.stability_fields import SCATTER
 from brakecli.views.render import TERMINAL, text_of
+from brakecli.views.reports.blocks import PAGE
 
 FLAG = integer("settled", "whether it has settled (0, 1)")
 SHARE = ratio("stick", "part of the time in stick")

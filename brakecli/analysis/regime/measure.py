@@ -18,7 +18,7 @@ from brakecli.analysis.regime.seen import Seen
 from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
-from brakecli.solver.motion.phases import STICK
+from brakecli.solver.phases import STICK
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Events, Track

@@ -20,7 +20,7 @@ from h5py import h5a, h5d, h5s, h5t, h5z
 
 from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, printable
-from brakecli.files.opening import opened
+from brakecli.results.opening import opened
 
 SHORTEST_TRIAL = 5.0  # s of processor time, and 0.1 s for each MB, to read a file that may be damaged
 _WAITING = 10.0  # times as long may it take where other processes or a slow disk hold it up

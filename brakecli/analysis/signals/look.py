@@ -15,7 +15,7 @@ from brakecli.analysis.signals.measure import Heard, answers
 from brakecli.analysis.signals.slips import Slips, seek
 from brakecli.analysis.signals.table import SignalThresholds, decide
 from brakecli.analysis.spectrum import Array
-from brakecli.files.fields import MEASURED_UNITS
+from brakecli.results.fields import MEASURED_UNITS
 
 _MOST_OF_IT = 0.9  # of the record: bursts that fill as much are the record
 _MOST_ENERGY = 0.5  # of all bursts in those that speak for the record

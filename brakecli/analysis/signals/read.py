@@ -17,9 +17,9 @@ from brakecli.analysis.signals.look import Measurand, Signal
 from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, UsageError, printable
 from brakecli.faces import argument
-from brakecli.files.opening import contents
-from brakecli.files.table import LARGEST, TextTable, ordinal, si
-from brakecli.files.table import require as _require
+from brakecli.results.opening import contents
+from brakecli.results.table import LARGEST, TextTable, ordinal, si
+from brakecli.results.table import require as _require
 
 _SI = {
     Measurand.DISPLACEMENT: ("meter",),

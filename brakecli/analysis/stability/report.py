@@ -8,7 +8,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from brakecli.analysis.margin import (
+from brakecli.analysis.stability.certain import Rounded, conditions, links_with
+from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
+from brakecli.analysis.stability.margin import (
     DIVERGENCE,
     FLUTTER,
     Change,
@@ -18,9 +20,7 @@ from brakecli.analysis.margin import (
     left_by_windows,
     left_open,
 )
-from brakecli.analysis.margin import changes as margin_changes
-from brakecli.analysis.stability.certain import Rounded, conditions, links_with
-from brakecli.analysis.stability.discrete import DIFFERENCE, spectral_radius
+from brakecli.analysis.stability.margin import changes as margin_changes
 from brakecli.analysis.stability.modes import (
     Crossing,
     Mode,

@@ -19,6 +19,8 @@ The rows are plain data; a file is imported when it is used. An evaluator keeps 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from brakecli.solver.records import MOST_KINDS
+
 if TYPE_CHECKING:
     from brakecli.solver.arrays import Floats
     from brakecli.solver.records import Layer
@@ -59,8 +61,6 @@ EVALUATORS: dict[str, Evaluator] = {
     "cells": Evaluator("brakecli.solver.contact.cells", nodes_per_wave=8),
 }
 """`auto` hands over to the others."""
-MOST_KINDS = 8
-"""How many of `kinds()` a run has counters for."""
 
 
 def kinds() -> tuple[str, ...]:

@@ -14,8 +14,8 @@ import numpy as np
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CELLS
+from brakecli.solver.contact.heights import gaps, rises
 from brakecli.solver.contact.pad import BESIDE
-from brakecli.solver.heights import gaps, rises
 from brakecli.solver.kernels import FAST, kernel
 from brakecli.solver.records import Layer
 

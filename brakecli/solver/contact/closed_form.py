@@ -5,7 +5,7 @@ from typing import Any
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
-from brakecli.solver.heights import eights, phases
+from brakecli.solver.contact.heights import eights, phases
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.records import Layer
 

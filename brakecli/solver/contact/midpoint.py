@@ -7,8 +7,8 @@ touches as a whole, so that the error falls with the square of its length.
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import MIDPOINT
 from brakecli.solver.contact.cells import note, note_more
+from brakecli.solver.contact.heights import rises
 from brakecli.solver.contact.pad import BESIDE
-from brakecli.solver.heights import rises
 from brakecli.solver.kernels import FAST, kernel
 from brakecli.solver.records import Layer
 

@@ -7,6 +7,7 @@ event. Nothing is smoothed.
 import math
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, MARGINS, MOST_SMOOTH_EVENTS, SIZE, V_X, V_Y, Y
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import columns, exact, extent
@@ -23,8 +24,7 @@ from brakecli.solver.motion.events import (
     see,
 )
 from brakecli.solver.motion.locate import NO_EVENT, first_event
-from brakecli.solver.motion.phases import OPEN, sliding_phase
-from brakecli.solver.motion.record import BELT, MARGINS, MOST_SMOOTH_EVENTS, SIZE, V_X, V_Y, Y
+from brakecli.solver.phases import OPEN, sliding_phase
 from brakecli.solver.plant import Plant
 
 MOST_STEPS = 100_000

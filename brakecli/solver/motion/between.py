@@ -1,16 +1,16 @@
 """The samples of a motion in Runge-Kutta steps, which lie on the continuous solution between their ends."""
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, BELT_SLOPE, LOAD, LOAD_SLOPE, V_X, V_Y, X, Y
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.force import evaluate
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion.forces import act_first, resistance, touch
-from brakecli.solver.motion.phases import OPEN, STICK
-from brakecli.solver.motion.record import BELT, BELT_SLOPE, LOAD, LOAD_SLOPE, V_X, V_Y, X, Y
 from brakecli.solver.motion.samples import mark_at, put_sample, renew_disturbance
 from brakecli.solver.motion.steps import begin, put_at_start, step
 from brakecli.solver.motion.tableaus import interpolated
+from brakecli.solver.phases import OPEN, STICK
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import Failure
 

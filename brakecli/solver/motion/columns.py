@@ -15,11 +15,11 @@ lost or made, no force jumps: f' = f, and it is the identity.
 import math
 from typing import Any
 
+from brakecli.solver.block import COLUMNS, MATRICES, RUNGE_KUTTA, TERMS, V_X, V_Y, X, Y
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, forces
-from brakecli.solver.motion.phases import STICK
-from brakecli.solver.motion.record import COLUMNS, MATRICES, RUNGE_KUTTA, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.phases import STICK
 from brakecli.solver.plant import Plant
 
 _ERROR_TERMS = 9

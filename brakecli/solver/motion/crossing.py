@@ -2,14 +2,14 @@
 
 import math
 
+from brakecli.solver.block import BELT, BELT_SLOPE, MARGINS, V_X, V_Y, X, Y
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.motion.forces import NEAR, find_margin_rates, find_margins, rounding
 from brakecli.solver.motion.locate import NO_EVENT
-from brakecli.solver.motion.phases import HEIGHT, OPEN, SOONER, STICK, side_of
-from brakecli.solver.motion.record import BELT, BELT_SLOPE, MARGINS, V_X, V_Y, X, Y
 from brakecli.solver.motion.tableaus import END_STAGE, interpolated_both, reach
+from brakecli.solver.phases import HEIGHT, OPEN, SOONER, STICK, side_of
 from brakecli.solver.plant import Plant
 
 LOOKS = 8

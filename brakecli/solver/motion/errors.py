@@ -10,13 +10,13 @@ import math
 import numpy as np
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BY_NODES, BY_STEPS, STAGES, V_X, V_Y, X, Y
 from brakecli.solver.contact import CELLS
 from brakecli.solver.contact.cells import left_out
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion.forces import NEAR, act, cone
-from brakecli.solver.motion.phases import OPEN, STICK, side_of
-from brakecli.solver.motion.record import BY_NODES, BY_STEPS, STAGES, V_X, V_Y, X, Y
 from brakecli.solver.motion.tableaus import END_STAGE, interpolated_both, reach
+from brakecli.solver.phases import OPEN, STICK, side_of
 from brakecli.solver.plant import Plant
 from brakecli.solver.records import SPANS
 

@@ -4,22 +4,7 @@ import math
 from typing import Any
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.double_double import ROUNDING
-from brakecli.solver.kernels import kernel
-from brakecli.solver.motion import columns, exact, forces
-from brakecli.solver.motion.phases import (
-    HEIGHT,
-    PULL,
-    PUSH,
-    STICK,
-    UNDECIDED,
-    anchored,
-    counted,
-    following,
-    held,
-    stalled,
-)
-from brakecli.solver.motion.record import (
+from brakecli.solver.block import (
     BELT,
     BELT_SLOPE,
     LOAD,
@@ -31,6 +16,21 @@ from brakecli.solver.motion.record import (
     V_Y,
     X,
     Y,
+)
+from brakecli.solver.double_double import ROUNDING
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion import columns, exact, forces
+from brakecli.solver.phases import (
+    HEIGHT,
+    PULL,
+    PUSH,
+    STICK,
+    UNDECIDED,
+    anchored,
+    counted,
+    following,
+    held,
+    stalled,
 )
 from brakecli.solver.plant import Plant
 from brakecli.solver.schedules import KNOT, TIME, integral_at, segment, slope_at, value_at

@@ -10,12 +10,7 @@ from typing import Any
 import numpy as np
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.double_double import EPSILON
-from brakecli.solver.kernels import kernel
-from brakecli.solver.motion.cubic import lowest
-from brakecli.solver.motion.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of
-from brakecli.solver.motion.record import (
+from brakecli.solver.block import (
     AHEAD,
     BELT,
     BELT_SLOPE,
@@ -30,6 +25,11 @@ from brakecli.solver.motion.record import (
     X,
     Y,
 )
+from brakecli.solver.coefficients import Coefficients
+from brakecli.solver.double_double import EPSILON
+from brakecli.solver.kernels import kernel
+from brakecli.solver.motion.cubic import lowest
+from brakecli.solver.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of
 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]

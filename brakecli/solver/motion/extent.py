@@ -4,12 +4,12 @@ import math
 from typing import Any
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BANDS, MARGINS, PHASES, TERMS, V_X, X
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.motion.locate import NO_EVENT, root
-from brakecli.solver.motion.phases import STICK
-from brakecli.solver.motion.record import BANDS, MARGINS, PHASES, TERMS, V_X, X
+from brakecli.solver.phases import STICK
 from brakecli.solver.track import put, turned
 
 _BANDS: tuple[float, ...] = 0.25, 0.35

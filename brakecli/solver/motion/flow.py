@@ -7,11 +7,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, LOAD, MATRICES, MOST_TURNS, V_X
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.motion.orbit import CLOSED
-from brakecli.solver.motion.phases import BACKWARD, FORWARD, OPEN, STICK
-from brakecli.solver.motion.record import BELT, LOAD, MATRICES, MOST_TURNS, V_X
 from brakecli.solver.motion.tasks import FLY, SEEK, SWING, advance
+from brakecli.solver.phases import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
 from brakecli.solver.system import System, longest_step

@@ -6,6 +6,7 @@ the step finds them.
 """
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, BELT_SLOPE, LOAD, LOAD_SLOPE, V_X, V_Y, X, Y
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import CLOSED_FORM, EVALUATORS
 from brakecli.solver.contact.cells import press
@@ -13,8 +14,7 @@ from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage, fu
 from brakecli.solver.contact.force import evaluate
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
-from brakecli.solver.motion.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, held, side_of
-from brakecli.solver.motion.record import BELT, BELT_SLOPE, LOAD, LOAD_SLOPE, V_X, V_Y, X, Y
+from brakecli.solver.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, held, side_of
 from brakecli.solver.plant import Plant
 
 NEAR = 3.0

@@ -12,15 +12,7 @@ columns carry the derivative of that time, so that they are the derivative of th
 import math
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.contact.cells import extreme_gap
-from brakecli.solver.kernels import kernel, stopped
-from brakecli.solver.motion import columns, extent
-from brakecli.solver.motion.cubic import lowest
-from brakecli.solver.motion.events import DONE, INTERRUPTED, LOST, anchor, enter_phase, look, pass_event
-from brakecli.solver.motion.forces import act, find_again, find_margin_rates, find_margins, rate, resistance, touch
-from brakecli.solver.motion.locate import NO_EVENT
-from brakecli.solver.motion.phases import HEIGHT, PULL, PUSH, SLIDING, STICK, side_of, sliding_phase
-from brakecli.solver.motion.record import (
+from brakecli.solver.block import (
     BELT,
     LOAD,
     MARGINS,
@@ -32,8 +24,16 @@ from brakecli.solver.motion.record import (
     X,
     Y,
 )
+from brakecli.solver.contact.cells import extreme_gap
+from brakecli.solver.kernels import kernel, stopped
+from brakecli.solver.motion import columns, extent
+from brakecli.solver.motion.cubic import lowest
+from brakecli.solver.motion.events import DONE, INTERRUPTED, LOST, anchor, enter_phase, look, pass_event
+from brakecli.solver.motion.forces import act, find_again, find_margin_rates, find_margins, rate, resistance, touch
+from brakecli.solver.motion.locate import NO_EVENT
 from brakecli.solver.motion.runge_kutta import advance_stages
 from brakecli.solver.motion.tableaus import END_STAGE, NODES, A
+from brakecli.solver.phases import HEIGHT, PULL, PUSH, SLIDING, STICK, side_of, sliding_phase
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND
 

@@ -2,11 +2,11 @@
 
 from typing import Any
 
+from brakecli.solver.block import BELT, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
 from brakecli.solver.double_double import EPSILON
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion.exact import ROUNDING, unseen
-from brakecli.solver.motion.phases import SOONER, STICK
-from brakecli.solver.motion.record import BELT, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.phases import SOONER, STICK
 
 NO_EVENT = -1
 _SMALLEST = 2.0**-12  # part of a span that is looked at for a dip

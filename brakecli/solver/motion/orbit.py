@@ -18,11 +18,11 @@ import math
 from typing import Any
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, MOST_SMOOTH_EVENTS, MOST_TURNS, V_X, V_Y, X, Y
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, extent
 from brakecli.solver.motion.advance import advance, begin, fly
 from brakecli.solver.motion.events import DONE, LONG, STALLED, TURNED
-from brakecli.solver.motion.record import BELT, MOST_SMOOTH_EVENTS, MOST_TURNS, V_X, V_Y, X, Y
 from brakecli.solver.plant import Plant
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.tangent import MOST_POWERS

@@ -15,13 +15,13 @@ from enum import IntEnum
 import numpy as np
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, LOAD
 from brakecli.solver.coefficients import fastest_decay
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.double_double import two_product
 from brakecli.solver.motion import events as ends
-from brakecli.solver.motion.phases import STICK
-from brakecli.solver.motion.record import BELT, LOAD
 from brakecli.solver.motion.tasks import FLY, step
+from brakecli.solver.phases import STICK
 from brakecli.solver.plant import PLANT
 from brakecli.solver.records import COEFFICIENTS, filled, one
 from brakecli.solver.roughness import wheel_angles

@@ -3,14 +3,14 @@
 import math
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import STAGES, V_X, V_Y, X
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import tableaus
 from brakecli.solver.motion.forces import act, find_margin_rates, find_margins, rounding
-from brakecli.solver.motion.phases import STICK
-from brakecli.solver.motion.record import STAGES, V_X, V_Y, X
 from brakecli.solver.motion.tableaus import END_STAGE, NODES, USED
+from brakecli.solver.phases import STICK
 from brakecli.solver.plant import Plant
 
 _DEFECT = 20.0

@@ -1,13 +1,13 @@
 """The samples of a motion, the works up to them and its turning points: steps end on the grid of samples."""
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import BELT, MATRICES, SIZE, V_X, V_Y, X, Y
 from brakecli.solver.friction import observed
 from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import columns, exact
 from brakecli.solver.motion.advance import advance, begin
 from brakecli.solver.motion.events import DONE, LONG, STALLED, pass_knot
-from brakecli.solver.motion.phases import CONE, OPEN, STICK, carried, side_of
-from brakecli.solver.motion.record import BELT, MATRICES, SIZE, V_X, V_Y, X, Y
+from brakecli.solver.phases import CONE, OPEN, STICK, carried, side_of
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.schedules import integral_at, value_at

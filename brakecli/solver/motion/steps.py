@@ -7,15 +7,7 @@ or load, so that what acts from outside is linear in it.
 import math
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.double_double import EPSILON
-from brakecli.solver.kernels import kernel, stopped
-from brakecli.solver.motion import errors
-from brakecli.solver.motion.crossing import crossing
-from brakecli.solver.motion.events import STALLED, anchor, enter_phase, note_phase, pass_event, pass_knot
-from brakecli.solver.motion.forces import act_first, renew
-from brakecli.solver.motion.locate import NO_EVENT
-from brakecli.solver.motion.phases import HEIGHT, OPEN, STICK, carried, sliding_phase
-from brakecli.solver.motion.record import (
+from brakecli.solver.block import (
     BELT,
     BELT_SLOPE,
     KNOWN,
@@ -28,8 +20,16 @@ from brakecli.solver.motion.record import (
     X,
     Y,
 )
+from brakecli.solver.double_double import EPSILON
+from brakecli.solver.kernels import kernel, stopped
+from brakecli.solver.motion import errors
+from brakecli.solver.motion.crossing import crossing
+from brakecli.solver.motion.events import STALLED, anchor, enter_phase, note_phase, pass_event, pass_knot
+from brakecli.solver.motion.forces import act_first, renew
+from brakecli.solver.motion.locate import NO_EVENT
 from brakecli.solver.motion.runge_kutta import attempt, to_event
 from brakecli.solver.motion.tableaus import END_STAGE, ORDER, USED, A, interpolated, interpolated_both
+from brakecli.solver.phases import HEIGHT, OPEN, STICK, carried, sliding_phase
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.roughness import turn

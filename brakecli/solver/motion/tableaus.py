@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from brakecli.solver.arrays import Floats
+from brakecli.solver.block import POWERS, STAGES
 from brakecli.solver.kernels import kernel
-from brakecli.solver.motion.record import POWERS, STAGES
 
 END_STAGE = 12
 USED, LAST, TERMS, ORDER = np.array([[12, 6], [16, 13], [7, 4], [8, 5]])

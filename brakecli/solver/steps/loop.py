@@ -3,15 +3,17 @@
 import math
 from typing import Any
 
+from brakecli.solver import kernels
 from brakecli.solver.arrays import ROWS, VECTOR, Floats
 from brakecli.solver.contact.force import evaluate
 from brakecli.solver.friction import observed
 from brakecli.solver.kernels import entry, kernel, stopped
-from brakecli.solver.motion.phases import FORWARD, OPEN, STICK
+from brakecli.solver.phases import FORWARD, OPEN, STICK
 from brakecli.solver.plant import PLANT, Plant
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
+from brakecli.solver.schemes import SchemeModule, module_of
 from brakecli.solver.steps.implicit import SOLVED, solve
 from brakecli.solver.steps.step import finish, prepare
 from brakecli.solver.track import enter, mark, put, turned
@@ -220,3 +222,10 @@ def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: 
 
 take_sample = entry(None, PLANT, VECTOR, VECTOR, VECTOR)(sample)
 """`sample`, for Python."""
+
+
+def load(name: str) -> SchemeModule:
+    """The module of a scheme; its loop is loaded before anything is timed."""
+    module = module_of(name)
+    kernels.load(getattr(module, "advance", advance))
+    return module

@@ -1,0 +1,291 @@
+"""What branches of a case answer: where it squeals by itself, and where it can vibrate beside stable sliding."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from brakecli.analysis.branches.bar import Bound
+from brakecli.analysis.branches.explore import Explored, crossing, span
+from brakecli.analysis.branches.follow import RUNS_AGAIN
+from brakecli.analysis.branches.line import Line
+from brakecli.analysis.branches.point import End, Point
+from brakecli.analysis.branches.sliding import Slide, stable_spans
+from brakecli.analysis.branches.stable_parts import (
+    CUT,
+    NARROWEST,
+    Part,
+    Span,
+    merged,
+    stable_parts,
+    told_apart,
+    united,
+)
+from brakecli.analysis.branches.told import FORCED, SLIDING, Followed, Mark
+
+MEET = 1e-3
+"""Part of the range, and of their states, by which two ends of branches differ at most that are one motion."""
+SAME = 1e-9
+"""Distance of two places of the range that are one, but for rounding."""
+NONE_BEGINS = "no vibration begins in the range; --start follows one that a run has come to"
+
+
+@dataclass(frozen=True)
+class Answers:
+    """The branches of a case along keys, and what they answer; values in the unit of the keys."""
+
+    explored: Explored
+    own: float | None  # value of the keys in the case itself; None where they differ
+
+    @property
+    def line(self) -> Line:
+        """Along which it was looked."""
+        return self.explored.line
+
+    @property
+    def parameter(self) -> str:
+        """The key, or the keys."""
+        return ",".join(self.line.keys)
+
+    @property
+    def lower(self) -> float:
+        """The lower end of the range."""
+        return self.line.low
+
+    @property
+    def upper(self) -> float:
+        """The upper end of the range."""
+        return self.line.high
+
+    @property
+    def branches(self) -> list[Followed]:
+        """All of them, steady sliding first."""
+        return self.explored.branches
+
+    @cached_property
+    def bases(self) -> list[Followed]:
+        """The forced motions that grow with the waves out of steady sliding; none where nothing forces any."""
+        return [each for each in self.branches if each.kind == FORCED and not each.note]
+
+    @cached_property
+    def known(self) -> list[Span]:
+        """Where the motion is known that continues steady sliding."""
+        if self.bases:
+            return merged([*map(span, self.bases), *self._bridges])
+        slides = self._slides
+        return [(slides[0].p, slides[-1].p)] if slides else []
+
+    @property
+    def range(self) -> Span | None:
+        """From the first place to the last one at which that motion is known; None where there is none."""
+        return (self.known[0][0], self.known[-1][1]) if self.known else None
+
+    @property
+    def _slides(self) -> list[Slide]:
+        """Where there is steady sliding, or a shoe that locks."""
+        return [slide for slide in self.explored.slides if slide.signs is not None]
+
+    @cached_property
+    def windows(self) -> list[tuple[Bound, Bound]]:
+        """Where the motion that continues steady sliding is unstable; a forced one on all of its sheets.
+
+        The ends are not known of one in which a branch is lost: it may come back as a stable motion.
+        """
+        found = list[tuple[Bound, Bound]]()
+        for (first, last), within in zip(self.known, self._edges, strict=True):
+            edges = [Bound(first), *within, Bound(last)]
+            for low, high in zip(edges[::2], edges[1::2], strict=True):
+                if high.p > low.p + NARROWEST:
+                    lost = any(low.p - low.error < p < high.p + high.error for p in self._lost_at)
+                    ends = (low._replace(known=False), high._replace(known=False)) if lost else (low, high)
+                    found.append(ends)
+        return found
+
+    @cached_property
+    def _cut_ends(self) -> list[tuple[End, Point]]:
+        """The ends at which branches of the motion that continues steady sliding are cut."""
+        found = [each.branch for each in self.bases if each.branch and each.branch.points]
+        ends = [pair for each in found for pair in zip(each.ended, (each.points[0], each.points[-1]), strict=True)]
+        return [(end, point) for end, point in ends if end.kind in CUT]
+
+    @cached_property
+    def _lost_at(self) -> list[float]:
+        """Where it goes on from there, and nobody knows how."""
+        return [point.p for end, point in self._cut_ends if end != RUNS_AGAIN]
+
+    @cached_property
+    def _bridges(self) -> list[Span]:
+        """Between two such ends that are one motion."""
+        return [
+            (min(one.p, other.p), max(one.p, other.p))
+            for (_, one), (_, other) in combinations(self._cut_ends, 2)
+            if abs(one.p - other.p) < MEET
+            and np.allclose(one.facts.state, other.facts.state, MEET, MEET * np.abs(one.facts.state).max())
+        ]
+
+    @property
+    def critical_windows_lower(self) -> list[float]:
+        """Lower ends of the intervals in which steady sliding is unstable."""
+        return [self.line.value(low.p) for low, _ in self.windows]
+
+    @property
+    def critical_windows_upper(self) -> list[float]:
+        """Their upper ends."""
+        return [self.line.value(high.p) for _, high in self.windows]
+
+    @cached_property
+    def lost(self) -> Bound | None:
+        """The least place at which the motion that continues steady sliding, stable below, loses its stability."""
+        return next((low for low, _ in self.windows if self.range and low.p > self.range[0]), None)
+
+    @property
+    def critical(self) -> float | None:
+        """The value there."""
+        return self.line.value(self.lost.p) if self.lost else None
+
+    @property
+    def critical_error(self) -> float | None:
+        """Its error bar."""
+        return self.lost.bar * abs(self.upper - self.lower) if self.lost else None
+
+    @cached_property
+    def _stable(self) -> list[Part]:
+        """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
+        if self.bases:
+            return united([part for each in self.bases for part in stable_parts(each)])
+        spans = stable_spans(self.explored.slides, self.explored.changes)
+        return [
+            Part(Bound(low, error=low_error), Bound(high, error=high_error), 0.0)
+            for (low, low_error), (high, high_error) in spans
+        ]
+
+    @cached_property
+    def _edges(self) -> list[list[Bound]]:
+        """Both ends of all stable parts in order, for each interval in which the motion is known."""
+        found = []
+        for first, last in self.known:
+            own = [part for part in self._stable if first <= part.low.p <= last]
+            found.append(told_apart([bound for part in own for bound in (part.low, part.high)]))
+        return found
+
+    @cached_property
+    def stable_spans(self) -> list[Span]:
+        """Where it is stable, by the ends."""
+        return [(a.p, b.p) for edges in self._edges for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+    @cached_property
+    def coexisting(self) -> list[tuple[float, float, float]]:
+        """Intervals with a stable vibration beside stable sliding, and its frequency (Hz) at the lower end."""
+        found = []
+        for followed in self.branches:
+            if followed.kind == SLIDING or followed in self.bases:
+                continue
+            for part in stable_parts(followed):
+                for begin, end in self.stable_spans:
+                    left = max(part.low.p, begin)
+                    right = min(part.high.p, end)
+                    if right > left + NARROWEST:
+                        found.append((left, right, part.frequency))
+        return sorted(found)
+
+    @property
+    def coexists_from(self) -> float | None:
+        """The least value with a stable vibration beside stable sliding."""
+        return self.line.value(self.coexisting[0][0]) if self.coexisting else None
+
+    @cached_property
+    def barrier(self) -> float | None:
+        """Half of peak to peak of x (m) of the smallest unstable cycle at the case's value; None without one."""
+        if self.own is None:
+            return None
+        p = self.line.place(self.own)
+        if not any(low <= p <= high for low, high in self.stable_spans):
+            return None
+        found = [
+            point.facts.amplitude
+            for followed in self.branches
+            if followed.kind != SLIDING
+            for point in crossing(followed, p)
+            if not point.stable
+        ]
+        return min(found, default=None)
+
+    @property
+    def cut(self) -> list[Mark]:
+        """The ends of branches that do not reach an end of the range, or steady sliding, or themselves."""
+        known = ("it reaches", "it is closed")
+        marks = [mark for followed in self.branches[1:] for mark in followed.ended]
+        return [mark for mark in marks if not mark.reason.startswith(known)]
+
+    @cached_property
+    def sentence(self) -> str:
+        """The answer in words."""
+        parts = [self._self_excited(), *self._beside_sliding()]
+        if self.barrier is not None and self.coexisting:
+            parts.append(
+                f"at the case's {self.own:.4g} an unstable cycle of {metres(self.barrier)} lies between the two"
+            )
+        parts += [f"the branch is cut at {mark.motion.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
+        return "; ".join(filter(None, [*parts, *self.explored.notes, self.sought]))
+
+    @cached_property
+    def sought(self) -> str:
+        """What pushes have come to, in words; empty where there were none."""
+        search = self.explored.search
+        if not search.pushes:
+            return ""
+        lowest = [min(part.low.p for part in stable_parts(followed)) for followed in search.found]
+        values = " and ".join(f"{self.line.value(p):.4g}" for p in sorted(lowest))
+        how = f"found in {search.pushes} pushes"
+        if len(lowest) == 0:
+            words = f"no other vibration {how}"
+        elif len(lowest) == 1:
+            words = f"another vibration, {how}, exists from {values} on"
+        else:
+            words = f"{len(lowest)} other vibrations, {how}, exist from {values} on"
+        return f"{words}; what {search.undecided} of these come to is not known" if search.undecided else words
+
+    def _self_excited(self) -> str:
+        if self.range is None:
+            return "nothing slides steadily"
+        first, last = self.range
+        words = list[str]()
+        diverges = {change.p for change in self.explored.changes if change.kind == "divergence"}
+        for low, high in ((low.p, high.p) for low, high in self.windows):
+            verb = "locks" if low in diverges and not self.bases else "squeals by itself"
+            begin, end = (f"{self.line.value(p):.4g}" for p in (low, high))
+            if low == first and high == last:
+                words.append(f"{verb} throughout")
+            elif high == last:
+                words.append(f"{verb} from {begin} on")
+            elif low == first:
+                words.append(f"{verb} up to {end}")
+            else:
+                words.append(f"{verb} from {begin} to {end}")
+        if words:
+            return " and ".join(words).replace("and squeals by itself ", "and ")
+        what = "the motion that the waves force" if self.bases else "steady sliding"
+        begin, end = (f"{self.line.value(p):.4g}" for p in (first, last))
+        where = "throughout" if (first, last) == (0.0, 1.0) else f"from {begin} to {end}, as far as it is known"
+        return f"{what} is stable {where}"
+
+    def _beside_sliding(self) -> list[str]:
+        if not self.coexisting:
+            followed = any(each.kind != SLIDING for each in self.branches)
+            return [] if followed or self.range is None or self.explored.notes else [NONE_BEGINS]
+        low, _, frequency = self.coexisting[0]
+        until = max(end for _, end, _ in self.coexisting)
+        begin, end = (f"{self.line.value(p):.4g}" for p in (low, until))
+        reaches = any(abs(until - edge) < SAME for edge in (1.0, *(low.p for low, _ in self.windows)))
+        where = f"from {begin} on" if reaches else f"from {begin} to {end}"
+        what = "the motion that the waves force" if self.bases else "stable sliding"
+        return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]
+
+
+def metres(length: float) -> str:
+    """A length with a unit that fits."""
+    for exponent, unit in ((0, "m"), (-3, "mm"), (-6, "µm"), (-9, "nm")):
+        if length >= 10.0**exponent:
+            return f"{length * 10.0**-exponent:.3g} {unit}"
+    return f"{length:.3g} m"

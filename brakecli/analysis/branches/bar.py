@@ -1,0 +1,107 @@
+"""Where a stable part of a branch ends, and how far steps and cells may have moved that end."""
+
+import math
+from itertools import pairwise
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from brakecli.analysis.branches.follow import both_ways
+from brakecli.analysis.branches.newton import Newton, Settings, zero
+from brakecli.analysis.branches.point import Point
+
+FINER = 1.5
+"""Times as many steps, and then as many cells, with which an end is located again: errors of both may cancel."""
+LEFT_OPEN = 4.0
+"""Times by which the error may exceed the change with finer steps. An error of second order is 1.8 times that
+change, but kinks of the contact force let it fall unevenly: as patches open, and where a whole pad lands."""
+KNOWN = 1e-6
+"""Least bar, in parts of the range, where steps are taken: multipliers are checked to so much."""
+STRIDES: tuple[float, ...] = 0.0, 1e-4, 1e-3, 1e-2, 5e-2
+"""Lengths by which two motions beside an end are moved apart until finer steps find it between them."""
+AROUND = Settings(points=60)
+"""How far a branch is followed with finer steps where these lengths do not hold its end."""
+ROUNDS = 24
+"""Motions that are computed to locate an end between two others."""
+LOCATED = 1e-7
+"""Change of p below which it is located."""
+NOT_ZERO = 1e-12
+"""Least size of a logarithm of a multiplier, so that it has the sign that the verdict on stability has."""
+
+
+class Bound(NamedTuple):
+    """An end of a stable part of a branch."""
+
+    p: float
+    error: float = 0.0  # by the bracket
+    inner: Point | None = None  # the last stable motion; None where no steps are taken, or the range ends
+    beyond: Point | None = None  # the first one that is not
+    problem: Any = None
+    known: bool = True  # otherwise the motion goes on, and nobody knows how far
+
+    @property
+    def bar(self) -> float:
+        """The error of p: that of the bracket, and what steps leave open."""
+        finer = self.problem.finer(FINER) if self.inner is not None else []
+        if not finer:
+            return self.error
+        moved = [self._moved(each) for each in finer]
+        return max(self.error, KNOWN) + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
+
+    def _moved(self, finer: Any) -> float | None:
+        """Where the end is with finer steps; None where it is not found."""
+        if self.inner is None or self.beyond is None:
+            return None
+        newton = Newton(finer, Settings())
+        one, other = sorted((self.inner, self.beyond), key=lambda each: each.s)
+        finer.use(one.chart)
+        for apart in STRIDES:
+            ends = [
+                newton.solved(each.z + way * each.tangent, each.tangent, each.tangent, each.s + way, exact=True)
+                for each, way in ((one, -apart), (other, apart))
+            ]
+            if ends[0] is not None and ends[1] is not None and ends[0].stable is not ends[1].stable:
+                return located(newton, ends[0], ends[1])
+        first = newton.solved(self.inner.z, self.inner.tangent, self.inner.tangent, 0.0, exact=True)
+        points = both_ways(finer, first, AROUND).points if first is not None else []
+        pairs = [each for each in pairwise(points) if each[0].stable is not each[1].stable]
+        found = [located(newton, *each) for each in pairs if each[0].chart is each[1].chart]
+        return min(found, key=lambda p: abs(p - self.p), default=None)
+
+
+def located(newton: Newton, one: Point, other: Point) -> float:
+    """The p between two motions of one chart at which the largest multiplier leaves the unit circle.
+
+    By the Illinois method and by halves in turns: without damping the multiplier stays beside the circle up to
+    there, and then leaves it like a root.
+    """
+    low = _outside(one)
+    high = _outside(other)
+    p = one.p
+    side = 0
+    for turn in range(ROUNDS):
+        part = 0.5 if turn % 2 else zero(low, high)
+        middle = newton.between(one, other, part) or newton.between(one, other, 0.5)
+        if middle is None:
+            break
+        moved = abs(middle.p - p)
+        p = middle.p
+        if moved < LOCATED:
+            return p
+        if middle.stable is one.stable:
+            one = middle
+            low = _outside(middle)
+            high = high * (0.5 if side == 1 else 1.0)
+            side = 1
+        else:
+            other = middle
+            high = _outside(middle)
+            low = low * (0.5 if side == -1 else 1.0)
+            side = -1
+    return 0.5 * (one.p + other.p)
+
+
+def _outside(point: Point) -> float:
+    """ln of the largest multiplier, which is negative where a motion is stable."""
+    size = math.log(max(float(np.abs(point.multipliers).max()), 1e-300))
+    return min(size, -NOT_ZERO) if point.stable else max(size, NOT_ZERO)

@@ -1,0 +1,127 @@
+"""Whether a branch has come back: to its first point, or over itself."""
+
+import math
+
+import numpy as np
+
+from brakecli.analysis.branches.newton import Newton, zero
+from brakecli.analysis.branches.point import End, Point
+
+LEAST_LOOP = 8
+"""A closed branch turns by 2π, so it has more points than this: each stride turns by at most 0.7 rad."""
+RECENT = 20
+"""Points among which one is sought over which the branch runs back."""
+TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
+REACH = 10.0
+"""Strides with which a border is crossed, within which a branch that runs back over itself meets a point again."""
+PASSES = 4.0
+"""Strides from the first point, beyond which a branch that crosses its plane passes elsewhere; a choice."""
+NARROWED = 7
+"""Points that bracket the crossing. A choice: what is wider then is compared all the same."""
+SHARP = 0.7
+"""Cosine of the angle by which a branch turns at a sharp corner."""
+SAME_PLACE = 1e-7
+"""Distance at which two points are one; corrections end at about 1e-12."""
+BRACKETED = 1e-7
+"""Length of a bracket of the crossing that is narrow enough."""
+CARRIED = 1e-4
+"""Distance at which two points are one, where the problem has carried one of them to another chart."""
+LEAST_SLOPE = 1e-3
+"""Slope dp/ds at the first point from which on p says where a branch in another chart passes it."""
+SAME_WAY = 0.999
+"""Least cosine of the angle between the tangents of two points that are one."""
+
+
+def turned_back(points: list[Point], new: Point, border: float) -> bool:
+    """Whether the branch has come back across a border and runs back over itself."""
+    if new.word == points[-1].word:
+        return False
+    reach = REACH * border
+    for point in points[: -1 - RECENT : -1]:
+        if point.chart is new.chart and point.word == new.word:
+            chord = new.z - point.z
+            return bool(math.sqrt(chord @ chord) < reach and new.tangent @ point.tangent < -SAME_WAY)
+    return False
+
+
+def passed(points: list[Point]) -> list[Point]:
+    """The earlier point, if any, that the last stride passes on its way along the same stretch of the branch.
+
+    Newton's method may go over to another branch where two cross. Then a closed one is entered, and its first
+    point is not that of the walk.
+    """
+    here, new = points[-2:]
+    way = new.s - here.s
+    beside = [
+        point
+        for point in points[1:-LEAST_LOOP]
+        if abs(point.p - new.p) <= way
+        and point.chart is new.chart
+        and point.word == new.word
+        and float(point.tangent @ new.tangent) > SHARP
+        and float(np.abs(point.z - new.z).max()) <= way
+    ]
+    return beside[-1:]
+
+
+def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Point | None, End | None]:
+    """The last point and the end of a branch that has come back to its first point; None where it has not.
+
+    Where a stride crosses the plane across the first tangent, the crossing is bracketed on this branch until
+    no other one can be mistaken for it, and then compared with the first point: place and direction.
+    """
+    if here.chart is not new.chart or here.word != new.word or here is first:
+        return None, None
+    foreign = new.chart is not first.chart
+    if foreign and abs(first.tangent[-1]) < LEAST_SLOPE:
+        return None, None  # the parameter alone does not say where it passes the first point
+
+    def ahead(point: Point) -> float:
+        if foreign:
+            return float((point.z[-1] - first.z[-1]) * first.tangent[-1])
+        return float((point.z - first.z) @ first.tangent)
+
+    if ahead(here) * ahead(new) > 0.0:
+        return None, None
+    if not foreign:
+        away = here.z - first.z
+        if math.sqrt(away @ away) > PASSES * (new.s - here.s):
+            return None, None
+    one = here
+    other = new
+    for _ in range(NARROWED):
+        low = ahead(one)
+        high = ahead(other)
+        middle = newton.between(one, other, zero(low, high))
+        if middle is None or middle.word != here.word:
+            return None, None
+        if ahead(middle) == 0.0 or other.s - one.s < BRACKETED:
+            one = middle
+            break
+        one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)
+    nearest = min((one, other), key=lambda point: abs(ahead(point)))
+    place = nearest.z
+    onward = nearest.tangent
+    chart = new.chart
+    if foreign:
+        guess = newton.problem.carried(nearest, first.chart)
+        if guess is None:
+            return None, None
+        place = np.append(guess[0], nearest.p)
+        onward = guess[1]
+        chart = first.chart
+    newton.problem.use(chart)
+    place = place - first.tangent * ((place - first.z) @ first.tangent)
+    crossing = newton.solved(place, first.tangent, onward, nearest.s, exact=True)
+    if crossing is None or crossing.word != first.word:
+        return None, None
+    if float(np.abs(crossing.z - place).max()) > (CARRIED if foreign else SAME_PLACE):
+        return None, None
+    if float(np.abs(crossing.z - first.z).max()) > SAME_PLACE:
+        return None, None
+    cosine = float(crossing.tangent @ first.tangent)
+    if cosine > SAME_WAY:
+        return crossing, End("closed", "it is closed: it comes back to its first point")
+    if cosine < -SAME_WAY:
+        return None, TURNED_BACK
+    return None, None

@@ -1,0 +1,40 @@
+"""From a flip to the motion of twice the period that is born there."""
+
+import math
+
+import numpy as np
+
+from brakecli.analysis.branches.multipliers import POWERS, product
+from brakecli.analysis.branches.newton import FROM_AFAR, LEFT, Newton, Settings
+from brakecli.analysis.branches.point import Point
+from brakecli.analysis.branches.problem import Array, Doubled
+
+DISTANCES: tuple[float, ...] = 1e-2, 3e-3, 1e-3, 3e-4
+"""Distances from the flip at which the doubled motion is sought."""
+
+
+def flipped(point: Point) -> Array:
+    """The eigenvector (d,) of the multiplier nearest to -1, of length one."""
+    total, log = product(point.maps)
+    values, vectors = np.linalg.eig(total * math.exp(min(log, POWERS)))
+    vector = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
+    return np.asarray(vector / np.linalg.norm(vector))
+
+
+def switch(problem: Doubled, point: Point, settings: Settings | None = None) -> Point | None:
+    """A first point on the branch of doubled motions, with a tangent away from the flip; None if none is found.
+
+    The plane in which it is sought lies across the doubled direction, at a distance from the flip. The motion of
+    the single period crosses that plane only far away.
+    """
+    u, direction = problem.doubled(point, flipped(point))
+    onward = direction / math.sqrt(direction @ direction)
+    newton = Newton(problem, settings or Settings())
+    flip = np.append(u, point.p)
+    for distance in DISTANCES:
+        new = newton.solved(flip + distance * onward, onward, onward, 0.0, exact=True, most=FROM_AFAR)
+        if new is not None:
+            off = new.z - flip - distance * onward
+            if math.sqrt(off @ off) < LEFT * distance:
+                return new
+    return None

@@ -1,0 +1,173 @@
+"""Branches as files and `--json` give them: rows of motions, and marks where something is special."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, partial
+from typing import Any
+
+import numpy as np
+
+from brakecli.analysis.branches.extent import Extent
+from brakecli.analysis.branches.line import Line
+from brakecli.analysis.branches.point import Branch, End, Point, Special
+from brakecli.analysis.branches.sliding import Change, Slide, Sliding
+from brakecli.analysis.stability.follow import followed
+from brakecli.analysis.stability.modes import Mode, modes_of
+from brakecli.solver.tangent import MOST_POWERS
+
+SLIDING = "steady sliding"
+LIMIT_CYCLE = "limit cycle"
+FORCED = "forced motion"
+IN_SLIDING = "it ends in steady sliding, where that flutters"
+BESIDE = 1e-5
+"""Length along a branch from its begin, within which a special point is that begin."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """A motion on a branch, as files and `--json` give it (SI units)."""
+
+    value: float
+    amplitude: float
+    frequency: float
+    stick_fraction: float
+    contact_loss_fraction: float
+    extent: Callable[[], Extent]
+    """Computed where it is asked for: points of sweeps have no use for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """A motion, whether it is stable, and what its disturbances are multiplied by."""
+
+    motion: Motion
+    stable: bool
+    multipliers: tuple[complex, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A special point of a branch; error in the unit of the value, and why, where the branch ends."""
+
+    motion: Motion
+    kind: str
+    error: float
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Followed:
+    """A branch, its motions in order, and what is special on it."""
+
+    kind: str
+    points: list[Row]
+    special: list[Mark]
+    branch: Branch | None = None
+    problem: Any = None
+    note: str = ""
+
+    @property
+    def ended(self) -> list[Mark]:
+        """Why it ends, at either end."""
+        return [mark for mark in self.special if mark.kind in ("end", "budget")]
+
+
+def slid(sliding: Sliding, slides: list[Slide], changes: list[Change]) -> Followed:
+    """Steady sliding, and the mode that is the first to grow, or comes nearest to it, followed by continuity.
+
+    Multipliers are those of a period of this mode, or of a second.
+    """
+    line = sliding.line
+    width = abs(line.high - line.low)
+    there = [slide for slide in slides if slide.eigenvalues is not None]
+    pairs = [pair for pair in followed(map(_modes, there)) if pair is not None]
+    growing = [pair for slide, pair in zip(there, pairs, strict=True) if not slide.stable]
+    worst = max(growing[:1] or pairs, key=lambda pair: max(mode.growth for mode in pair), default=None)
+    which = max((0, 1), key=lambda number: worst[number].growth) if worst else 0
+    rows = []
+    for slide, pair in zip(there, pairs, strict=True):
+        frequency = pair[which].frequency
+        turned = np.asarray(slide.eigenvalues) / (frequency or 1.0)
+        factors = np.exp(np.clip(turned.real, -MOST_POWERS, MOST_POWERS)) * np.exp(1j * turned.imag)
+        rows.append(Row(_at_rest(line, slide, frequency), slide.stable, tuple(factors.tolist())))
+    marks = [
+        Mark(_at_rest(line, sliding.at(change.p), change.frequency), change.kind, change.error * width)
+        for change in changes
+    ]
+    if there:
+        for slide, end in ((there[0], "lower"), (there[-1], "upper")):
+            whole = slide.p == (0.0 if end == "lower" else 1.0)
+            why = f"it reaches the {end} end of the range" if whole else "there is no steady sliding beyond"
+            marks.append(Mark(_at_rest(line, slide, 0.0), "end", 0.0, why))
+    return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.motion.value))
+
+
+def _modes(slide: Slide) -> tuple[Mode, ...]:
+    assert slide.eigenvalues is not None
+    assert slide.vectors is not None
+    return tuple(modes_of(slide.eigenvalues, slide.vectors))
+
+
+def _at_rest(line: Line, slide: Slide, frequency: float) -> Motion:
+    """Steady sliding as a motion."""
+    x, y = slide.rest or (None, None)
+    return Motion(line.value(slide.p), 0.0, frequency, 0.0, 0.0, lambda: Extent(0.0, 0.0, x, y))
+
+
+def told_of(
+    line: Line,
+    branch: Branch,
+    problem: Any,
+    kind: str,
+    change: Change | None = None,
+    changes: Sequence[Change] = (),
+) -> Followed:
+    """A branch as rows and marks; of the linear vibrations at its flutter only the largest one is kept."""
+    points = branch.points
+    specials = branch.specials
+    marks = []
+    if change is not None:
+        first = 0
+        if line.smooth:
+            first = next((k for k, point in enumerate(points) if len(set(point.facts.word)) > 1), len(points))
+        points = points[max(first - 1, 0) :]
+        beyond = points[0].s + BESIDE if line.smooth else 0.0
+        specials = [special for special in specials if special.s > beyond or special.kind == "end"]
+        marks.append(_mark(line, Special("flutter", change.p, change.error, points[0], points[0].s), problem))
+    for special in specials:
+        if special.kind == "end" and special.name == IN_SLIDING and changes:
+            near = min(changes, key=lambda each: abs(each.p - special.p))
+            marks.append(_mark(line, Special("flutter", near.p, near.error, special.point, special.s), problem))
+        else:
+            marks.append(_mark(line, special, problem, branch.ended))
+    rows = [
+        Row(_moving(line.value(point.p), point, problem), point.stable, tuple(point.multipliers.tolist()))
+        for point in points
+    ]
+    return Followed(kind, rows, marks, replace(branch, points=points), problem)
+
+
+def _moving(value: float, point: Point, problem: Any) -> Motion:
+    """A motion that repeats."""
+    cycle = point.facts
+    return Motion(
+        value,
+        cycle.amplitude,
+        cycle.frequency,
+        cycle.stick_fraction,
+        cycle.contact_loss_fraction,
+        cache(partial(problem.extent, point)),
+    )
+
+
+def _mark(line: Line, special: Special, problem: Any, ended: Sequence[End] = ()) -> Mark:
+    kind = special.name if special.kind == "grazing" else special.kind
+    if kind.startswith("sequence"):
+        kind = "grazing stick"
+    cut = [end for end in ended if end.reason == special.name and end.kind in ("points", "seconds", "interrupted")]
+    return Mark(
+        _moving(line.value(special.p), special.point, problem),
+        "budget" if special.kind == "end" and cut else kind,
+        special.error * abs(line.high - line.low),
+        special.name if special.kind == "end" else "",
+    )

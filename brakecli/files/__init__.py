@@ -1,1 +1,0 @@
-"""Result files and the signals of the operating system: what a user gets, whole or not at all."""

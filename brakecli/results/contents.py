@@ -1,0 +1,258 @@
+"""What a result file holds, and how two of them differ."""
+
+import math
+from bisect import bisect_left
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from brakecli.errors import UsageError, printable
+from brakecli.results.field import Field, flat, integer, named, plain, plain_units, ratio
+from brakecli.results.fields import OBJECT, RUN, TEXT, WELCH
+from brakecli.results.numbers import DECLARED
+from brakecli.results.read import BLOCK, StoredResult, Variable
+from brakecli.results.toml_lines import parse
+from brakecli.results.write import FILL
+
+_CASES = ("resolved_toml", "resolved_sweep_toml", "resolved_study_toml")
+_APART = {
+    "case_toml",
+    "sweep_toml",
+    "study_toml",
+    *_CASES,
+    "title",
+    "kind",
+    "format",
+    "format_version",
+    "complete",
+}
+_RISING = ("time", "frequency")  # axes along which values are interpolated
+_NAMED = 3  # keys of the case in a sentence
+_ROUNDING = 1e-9  # of the largest value, which interpolation may add
+
+HELD = (
+    Field("group", "", "group of the file", TEXT),
+    Field("name", "", "name of the variable", TEXT),
+    Field("dims", "", "names of its axes", OBJECT),
+    Field("shape", "1", "their lengths", OBJECT),
+    Field("units", "", "its unit", TEXT),
+    Field("meaning", "", "what it is", TEXT),
+)
+INFO = (
+    Field("file", "", "the file", TEXT, at="path"),
+    *named(RUN, "status"),
+    Field("kind", "", "run, sweep, comparison, stability, branch or scatter", TEXT),
+    Field("title", "", "title of the case or of the sweep", TEXT),
+    Field("whole", "", "whether every byte is as it was written; any other file is refused", "?"),
+    integer("bytes", "size of the file"),
+    integer("format_version", "version of the form of the file"),
+    Field("versions", "", "versions of brakecli and of the libraries that made it", OBJECT),
+    Field("variables", "", "all variables", OBJECT, rows=HELD),
+)
+DIFFERENT_VALUE = (
+    Field("name", "", "key of the case, or name of the number with its group", TEXT),
+    Field("a", "", "value in the first file; null where there is none", OBJECT),
+    Field("b", "", "value in the second file; null where there is none", OBJECT),
+)
+DIFFERENT_NUMBER = (*DIFFERENT_VALUE, Field("units", "", "unit of both values", TEXT))
+DIFFERENT_VARIABLE = (
+    *HELD[:2],
+    Field("shapes", "1", "lengths of its axes in both files; null where it is missing", OBJECT),
+    integer("compared", "number of values that are in both"),
+    integer("different", "number of those that differ"),
+    Field("largest", "of the variable", "largest difference of two values; null for texts"),
+    ratio("relative", "that over the largest value in both; null where that is 0"),
+    Field("units", "", "unit of the variable", TEXT),
+    Field("interpolated", "", "the axis, time or frequency, where its values differ; null otherwise", TEXT),
+)
+DIFFERENCE_OF_TWO = (
+    Field("same", "", "whether case, numbers and variables are the same", "?"),
+    Field("sentence", "", "what differs, in a sentence", TEXT),
+    Field("case", "", "keys of the case and of the sweep that differ", OBJECT, rows=DIFFERENT_VALUE),
+    Field("numbers", "", "attributes that differ", OBJECT, rows=DIFFERENT_NUMBER),
+    Field("variables", "", "variables that differ", OBJECT, rows=DIFFERENT_VARIABLE),
+    Field("versions", "", "versions that differ", OBJECT, rows=DIFFERENT_VALUE),
+)
+"""How two files differ; neither this nor what one holds is in any file."""
+
+
+def contents(result: StoredResult) -> dict[str, Any]:
+    """What `INFO` declares."""
+    held = []
+    for group in result.groups:
+        for name, each in result.variables(group).items():
+            units, meaning = (str(each.attributes.get(name, "")) for name in ("units", "long_name"))
+            about = {"units": units, "meaning": meaning}
+            held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
+    attributes = result.attributes
+    known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
+    sizes = {"whole": True, "bytes": result.length}
+    return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
+
+
+@dataclass(frozen=True)
+class Difference:
+    """How a second result differs from a first one; `DIFFERENCE_OF_TWO` declares it."""
+
+    case: list[dict[str, Any]]
+    numbers: list[dict[str, Any]]
+    variables: list[dict[str, Any]]
+    versions: list[dict[str, Any]]
+    judged: bool  # whether both hold a verdict
+
+    @property
+    def same(self) -> bool:
+        """Whether there is none, but for versions."""
+        return not (self.case or self.numbers or self.variables)
+
+    @property
+    def sentence(self) -> str:
+        """What differs: keys of the case, the verdict, and which variable does most, beside its largest value."""
+        if self.same:
+            return "no difference in case, numbers and variables"
+        names = [str(each["name"]) for each in self.case]
+        rest = len(names) - _NAMED
+        more = f" and {rest} more key{'s' * (rest > 1)}" if rest > 0 else ""
+        said = [f"the case differs in {', '.join(names[:_NAMED])}{more}" if names else "the case is the same"]
+        if self.judged:
+            pairs = [each for each in self.numbers if each["name"] == "regime"]
+            places = [each for each in self.variables if each["name"] == "regime" and each["different"]]
+            said += [f"the verdict differs: {each['a']} and {each['b']}" for each in pairs]
+            said += [f"the verdict differs at {each['different']} of {each['compared']} points" for each in places]
+            said += ["the verdict is the same"] * (not pairs and not places)
+        if known := [each for each in self.variables if each["relative"]]:
+            most = max(known, key=lambda each: each["relative"])
+            units = "" if most["units"] == "1" else f" {plain_units(most['units'])}"
+            size = f"{most['largest']:.3g}{units}, {most['relative']:.3g} times its largest value"
+            said.append(f"{most['name']} differs most, by up to {size}")
+        return "; ".join(said)
+
+
+def difference(a: StoredResult, b: StoredResult) -> Difference:
+    """Compare two results of one kind; raises UsageError for two kinds, UnreadableResultError."""
+    kinds = [str(each.attributes.get("kind")) for each in (a, b)]
+    if kinds[0] != kinds[1]:
+        what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
+        raise UsageError(f"{what}: they hold different things; name two results of one kind")
+    groups = list(dict.fromkeys([*a.groups, *b.groups]))
+    numbers: list[dict[str, Any]] = [{}, {}]
+    for found, result in zip(numbers, (a, b), strict=True):
+        for group in groups:
+            for name, value in result.group_attributes(group).items() if group in result.groups else ():
+                if name not in _APART and not name.endswith("_version"):
+                    value = plain(value)  # xarray takes a list of one for a number
+                    value = value[0] if isinstance(value, list) and len(value) == 1 else value
+                    found[name if group == "/" else f"{group}/{name}"] = value
+    declared = DECLARED.get(kinds[0], ())
+    rows = ((field.group, row) for field in declared for row in (field.rows if field.group else [field]))
+    units = {f"{group}/{row.name}": row.units for group, row in rows}
+    units |= {f"spectrum/{field.name}": field.units for field in WELCH}
+    differing = [*changed(*numbers)]
+    for each in differing:
+        each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
+    variables = [each for group in groups for each in _variables(a, b, group)]
+    of_program = [*changed(a.versions, b.versions)]
+    judged = all("regime" in {**each.attributes, **each.variables("/")} for each in (a, b))
+    return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program, judged)
+
+
+def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, Any]:
+    """All keys of the case, and of the sweep or the study, with their values."""
+    found: dict[str, Any] = {}
+    for name in texts:
+        found |= flat(parse(str(result.attributes.get(name, "")), f"{result.path}: {name}"))
+    return found
+
+
+def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
+    """Name and both values of all that differs; None stands for what one of them lacks."""
+    for name in dict.fromkeys([*a, *b]):
+        if a.get(name) != b.get(name):
+            yield {"name": name, "a": a.get(name), "b": b.get(name)}
+
+
+def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
+    """The variables of a group that differ, at the same places along their axis."""
+    known = [each.variables(group) if group in each.groups else {} for each in (a, b)]
+    for name in dict.fromkeys([*known[0], *known[1]]):
+        held = [each[name] for each in known if name in each]
+        shapes = [list(each[name].shape) if name in each else [] for each in known]
+        compared = different = 0
+        largest = highest = 0.0
+        coded = any("flag_meanings" in each.attributes for each in held)
+        numeric = True
+        along = None
+        if all(shapes) and shapes[0][1:] == shapes[1][1:]:
+            along = _other_places(a, b, group, held)
+            for one, other in (_pairs if along is None else _interpolated)(a, b, group, name, along or ""):
+                numeric = not coded and one.dtype.kind in "iuf" and other.dtype.kind in "iuf"
+                apart = one != other
+                if numeric:
+                    there = (one != FILL) & (other != FILL)
+                    off = np.where(there, np.abs(1.0 * one - other), 0.0)
+                    sizes = [float(np.abs(each[there]).max(initial=0.0)) for each in (one, other)]
+                    apart &= ~there | (off > (_ROUNDING * max(sizes) if along else 0.0))
+                    largest = max(largest, float(off.max(initial=0.0)))
+                    highest = max(highest, *sizes)
+                compared = compared + one.size
+                different = different + int(apart.sum())
+        if different or shapes[0] != shapes[1]:
+            yield {
+                "group": group,
+                "name": name,
+                "shapes": [shape or None for shape in shapes],
+                "compared": compared,
+                "different": different,
+                "largest": largest if numeric and compared else None,
+                "relative": largest / highest if numeric and highest else None,
+                "units": str(held[0].attributes["units"]),
+                "interpolated": along,
+            }
+
+
+def _other_places(a: StoredResult, b: StoredResult, group: str, held: list[Variable]) -> str | None:
+    """The name of the axis of a variable, if it has one of numbers with other values in the second result."""
+    axis = held[0].dims[0]
+    if held[0].dims != held[1].dims or len({*held[0].dims} - {"mode"}) != 1 or axis not in _RISING:
+        return None
+    return axis if any((one != other).any() for one, other in _pairs(a, b, group, axis)) else None
+
+
+def _pairs(a: StoredResult, b: StoredResult, group: str, name: str, _: str = "") -> Iterator[tuple[Any, Any]]:
+    """The rows of a variable in both results, up to the end of the shorter one."""
+    rows = min(result.variables(group)[name].shape[0] for result in (a, b))
+    for start in range(0, rows, BLOCK):
+        one, other = (result.read(group, name, start, min(start + BLOCK, rows)) for result in (a, b))
+        yield one, other
+
+
+def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis: str) -> Iterator[tuple[Any, Any]]:
+    """A variable where the result with fewer rows in the common range has it; states are those of the nearest."""
+
+    def row(result: StoredResult, place: float) -> int:
+        rows = range(result.variables(group)[axis].shape[0])
+        return bisect_left(rows, place, key=lambda row: float(result.read(group, axis, row, row + 1)[0]))
+
+    ends = [[float(result.read(group, axis, *at)[0]) for at in ((0, 1), (-1, None))] for result in (a, b)]
+    first = max(low for low, _ in ends)
+    last = min(high for _, high in ends)
+    parts = [range(row(result, first), row(result, math.nextafter(last, math.inf))) for result in (a, b)]
+    swapped = len(parts[1]) < len(parts[0])
+    one, other, part = (b, a, parts[1]) if swapped else (a, b, parts[0])
+    for start in part[::BLOCK]:
+        stop = min(start + BLOCK, part.stop)
+        at, values = (one.read(group, each, start, stop) for each in (axis, name))
+        near = max(row(other, at[0]) - 1, 0), row(other, at[-1]) + 1
+        places, there = (other.read(group, each, *near) for each in (axis, name))
+        where = np.interp(at, places, np.arange(len(places)))
+        low = np.floor(where).astype(int)
+        high = np.ceil(where).astype(int)
+        if there.dtype.kind == "f":
+            weight = (where - low).reshape(-1, *[1] * (there.ndim - 1))
+            known = (there[low] != FILL) & (there[high] != FILL)
+            between = np.where(known, there[low] + weight * (there[high] - there[low]), FILL)
+        else:
+            between = there[np.round(where).astype(int)]
+        yield (between, values) if swapped else (values, between)

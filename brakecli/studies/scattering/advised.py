@@ -1,0 +1,142 @@
+"""Advice under scatter: how likely a brake still squeals that is built to a changed drawing, but not quite.
+
+Without a study, stiffnesses and friction scatter by a tenth about the values of the drawing, and all samples are
+asked at once: the mean stiffness of the contact is taken to be proportional to that of its layer, as it is where
+the pad touches everywhere.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.probability import Probability
+from brakecli.analysis.stability.advice import Change, Left, changed, numbers
+from brakecli.analysis.stability.modes import first_order, is_undamped, stiffness_matrix
+from brakecli.case.case import Case
+from brakecli.case.read import LoadedCase, key_path
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
+from brakecli.solver.integrate import Counted
+from brakecli.solver.links import coefficients
+from brakecli.solver.steady_sliding import sliding
+from brakecli.studies.runs.advise import AdviceReport
+from brakecli.studies.scattering.draw import drawn
+from brakecli.studies.scattering.eigen import ask, asking
+from brakecli.studies.scattering.scatter import squeals
+from brakecli.studies.scattering.study import LoadedStudy, Parameter, Study
+from brakecli.studies.sweeps.listed import GIVEN, Listed
+from brakecli.studies.sweeps.plan import LoadedSweep, sweep_of
+from brakecli.studies.sweeps.workers.task import Engine
+
+TOLERANCE = 10.0
+"""Per cent by which stiffnesses and friction scatter where no study says it; a choice."""
+SAMPLES = 1024
+"""Brakes that are drawn: so many know a probability to a hundredth or so."""
+_SCATTERING = (
+    ("link1", "stiffness"),
+    ("link2", "stiffness"),
+    ("contact", "stiffness"),
+    ("friction", "coefficient"),
+)
+
+
+def under_tolerance(report: AdviceReport, case: Case) -> AdviceReport:
+    """The advice with the squeal that each leaves, where stiffnesses and friction scatter by a tenth.
+
+    It stays in its order. Where no dashpot acts, or nothing slides, no probability is known.
+    """
+    if report.stability.equilibrium is None or report.stability.belt_speed == 0.0:
+        return report
+
+    def left(change: Change) -> Left | None:
+        there = None if change.to is None else changed(case, key_path(change.parameter), float(change.rounded))
+        return None if there is None else _left(there)
+
+    words = f"of ±{TOLERANCE:g} % in stiffness and friction"
+    advice = [replace(each, squeal=left(each)) for each in report.advice]
+    return replace(report, advice=advice, squeal=_left(case), scatter=words)
+
+
+def _left(case: Case) -> Left | None:
+    """The part of such brakes that squeal; None where that is not known."""
+    hits = squealing(case)
+    return None if hits is None else Left(*Probability.of(hits))
+
+
+def squealing(case: Case) -> NDArray[np.bool_] | None:
+    """Which of the brakes about a drawing have a mode that grows and swings: sets, samples. None if not known."""
+    system = system_of(case)
+    rest = sliding(system)
+    if rest is None or not rest.is_pressed(system.load_at_start) or is_undamped(system.coefficients):
+        return None
+    study = about(case)
+    values = drawn(study)
+    columns = {each.paths[0]: values[..., number] for number, each in enumerate(study.parameter)}
+    own = {".".join(path): numbers(case).get(path, 0.0) for path in _SCATTERING}
+    drawing: dict[str, Any] = {
+        key: columns.get(key, np.full(values.shape[:2], value)) for key, value in own.items()
+    }
+    phi = drawing["friction.coefficient"]
+    layer = drawing["contact.stiffness"]
+    c = coefficients(
+        mass=case.shoe.mass,
+        c_1=drawing["link1.stiffness"],
+        b_1=case.link1.damping,
+        beta_deg=case.link1.angle_deg,
+        c_2=drawing["link2.stiffness"],
+        b_2=case.link2.damping,
+        alpha_deg=case.link2.angle_deg,
+        phi=case.friction.coefficient,
+    )
+    k = rest.stiffness * layer / case.contact.stiffness
+    motion = first_order(c, stiffness_matrix(c, k, np.copysign(phi, system.belt_speed)) / case.shoe.mass)
+    roots = np.linalg.eigvals(motion)
+    return np.asarray(((roots.real > 0.0) & (roots.imag > 0.0)).any(axis=-1))
+
+
+def about(case: Case) -> Study:
+    """Brakes about a drawing: stiffnesses and friction uniform within a tenth of its values."""
+    own = numbers(case)
+    known = [".".join(path) for path in _SCATTERING if own.get(path)]
+    laws = [Parameter(key=key, distribution="uniform", tolerance_percent=TOLERANCE).over(case) for key in known]
+    return Study(case=GIVEN, samples=SAMPLES, parameter=tuple(laws))
+
+
+def under_scatter(
+    report: AdviceReport, base: LoadedCase, loaded: LoadedStudy, engine_of: Callable[..., Engine], tell: Counted
+) -> AdviceReport:
+    """The advice with the probability of squeal that each leaves, by eigenvalues, the least first.
+
+    Squeal counts at any frequency: advice that moves it out of the band of the study does not help. A key that
+    scatters itself is shifted with its distribution. What leaves samples without a case has none.
+    """
+    study = loaded.study.model_copy(update={"method": "eigenvalue", "band": None})
+    values = drawn(study)
+
+    def left(change: Change | None) -> Left | None:
+        try:
+            sweep = _changed(study.columns(values), change, base)
+        except CaseError:
+            return None
+        with engine_of(sweep.plan, compute=asking(sweep.plan, study.band)) as engine:
+            asked = ask(engine, sweep.plan.points, tell)
+        hits = squeals(study, {name: asked[name] for name in asked.dtype.names or ()})
+        return Left(*Probability.of(hits.reshape(values.shape[:2])))
+
+    advice = [replace(each, squeal=left(each) if each.to is not None else None) for each in report.advice]
+    advice.sort(key=lambda each: np.inf if each.squeal is None else each.squeal.squeal_probability)
+    ranking = "What leaves least squeal under the study's scatter first"
+    return replace(report, advice=advice, squeal=left(None), scatter="as of the study", ranking=ranking)
+
+
+def _changed(columns: dict[str, list[float]], change: Change | None, base: LoadedCase) -> LoadedSweep:
+    """The samples with a change; raises CaseError where one of them is no case."""
+    if change is not None:
+        count = len(next(iter(columns.values())))
+        to = float(change.rounded)
+        own = columns.get(change.parameter, [change.start] * count)
+        columns = columns | {change.parameter: [each + (to - change.start) for each in own]}
+    return sweep_of({"case": GIVEN, "points": GIVEN}, base, Listed.of([*columns], columns.values()))

@@ -1,0 +1,141 @@
+"""The lock-in diagram: both modes of steady sliding along a key of the case, and where stability changes."""
+
+import csv
+import io
+from dataclasses import dataclass, replace
+from functools import cache, reduce
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from brakecli.analysis.stability.certain import Rounded, conditions, links_with
+from brakecli.analysis.stability.edges import middles
+from brakecli.analysis.stability.follow import followed
+from brakecli.analysis.stability.margin import changes
+from brakecli.analysis.stability.report import stability
+from brakecli.case.case import given_toml
+from brakecli.case.read import LoadedCase
+from brakecli.case.roughness import Records
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError
+from brakecli.results import stability_fields as fields
+from brakecli.results.atomic import new_output
+from brakecli.results.field import Field, labelled, values_of
+from brakecli.results.fields import TEXT
+from brakecli.results.write import new_result
+from brakecli.solver.integrate import Counted
+from brakecli.solver.steady_sliding import sliding
+from brakecli.solver.system import System
+from brakecli.studies.runs.run import origin
+from brakecli.studies.sweeps.plan import Plan
+from brakecli.studies.sweeps.result import unit
+from brakecli.studies.sweeps.tables import Axis
+
+_ZERO = 1e-12  # of the range of the key: a critical value below that is 0, but for rounding
+
+
+@dataclass(frozen=True)
+class LockIn:
+    """Stability along an axis; an entry holds the names of `fields.VARIED` and `fields.MODES`."""
+
+    axis: Axis
+    entries: list[dict[str, Any]]
+    critical_values: list[float]  # in the order of the axis
+
+    @property
+    def parameters(self) -> list[str]:
+        """The keys that are varied."""
+        return list(self.axis.parameter)
+
+
+def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> LockIn:
+    """Modes and critical friction at each value of an axis; messages call the axis `option`. Raises CaseError."""
+    sweep = {"case": "-", "axis": [axis.model_dump(exclude_unset=True)]}
+    plan = Plan(tomli_w.dumps(sweep), given_toml(loaded.case), Records(loaded.records))
+
+    def system_at(value: float) -> System:
+        settings = dict.fromkeys(plan.settings(0), value)
+        try:
+            return system_of(plan.case(settings))
+        except CaseError as error:
+            raise CaseError([replace(each, source=option) for each in error.problems]) from None
+
+    values = [axis.value(place) for place in range(axis.size)]
+    reports = []
+    for value in (values[0], values[-1]):  # so that a wrong end is known before anything is computed
+        system_at(value)
+    for place, value in enumerate(values):
+        progress("values", place, axis.size)
+        reports.append(stability(system_at(value)))
+    there = (report.modes if report.stable is not None and report.belt_speed else () for report in reports)
+    entries = []
+    for value, report, pair in zip(values, reports, followed(there), strict=True):
+        names = ("frequency", "growth", "damping_ratio")
+        columns = ([mode and getattr(mode, name) for mode in pair or (None, None)] for name in names)
+        found = dict(zip((field.name for field in fields.MODES), columns, strict=True))
+        entries.append({"value": value, **values_of(fields.VARIED, report), **found})
+    critical = list[float]()
+    known = {value: report for value, report in zip(values, reports, strict=True) if report.belt_speed}
+
+    case = plan.case(dict.fromkeys(plan.settings(0), values[0]))
+    whole = isinstance(reduce(getattr, axis.parameter[0].split("."), case), int)
+
+    @cache
+    def signs_at(value: float) -> list[Rounded] | None:
+        value = round(value) if whole else value
+        if value not in known:
+            progress("critical values", len(critical), len(critical) + 1)
+        system = system_at(value)
+        rest = known[value].equilibrium if value in known else sliding(system)
+        return (
+            None
+            if rest is None or not rest.is_pressed(system.load_at_start)
+            else conditions(
+                links_with(system.coefficients), rest.stiffness, system.coefficients.grip(system.belt_speed)
+            )
+        )
+
+    inner = middles(case, list(axis.parameter), values[0], values[-1]) if known else []
+    for change in changes(signs_at, sorted({*known, *inner})):
+        critical.append(change.value if abs(change.value) > _ZERO * abs(values[-1] - values[0]) else 0.0)
+    if values[-1] < values[0]:
+        critical.reverse()
+    return LockIn(axis, entries, critical)
+
+
+def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None:
+    """Write the diagram as HDF5, or as CSV where the name ends so; raises UsageError or CannotWriteError."""
+    if path.suffix.lower() == ".csv":
+        with new_output(path, force=force) as file:
+            file.write(_csv(found).encode())
+            file.publish()
+        return
+    axis = found.axis
+    names = found.parameters
+    with new_result(path, force=force) as result:
+        result.set_attributes(origin("stability", loaded.case.title, loaded))
+        result.set_fields(fields.LOCK_IN, values_of(fields.LOCK_IN, found))
+        place = Field(axis.name, unit(names[0]), ", ".join(names))
+        result.variable("/", place, (axis.name,), [entry["value"] for entry in found.entries], parameters=names)
+        result.axis("/", fields.MODE, [1, 2])
+        for field in (*fields.VARIED, *fields.MODES):
+            dims, kind = ((axis.name, "mode"), "f8") if field in fields.MODES else ((axis.name,), field.kind)
+            column = [entry[field.name] for entry in found.entries]
+            data = [text or "" for text in column] if kind == TEXT else column
+            result.column(replace(field, kind=kind), dims, data)
+        result.commit()
+
+
+def _csv(found: LockIn) -> str:
+    """A line for each value; what does not exist is empty."""
+    key = ", ".join(found.parameters)
+    columns = {labelled(key, unit(found.parameters[0])): [entry["value"] for entry in found.entries]}
+    for field in fields.VARIED:
+        columns[labelled(field.name, field.units)] = [entry[field.name] for entry in found.entries]
+    for field, mode in ((field, mode) for field in fields.MODES for mode in (1, 2)):
+        values = [entry[field.name][mode - 1] for entry in found.entries]
+        columns[labelled(f"{field.name} of mode {mode}", field.units)] = values
+    stream = io.StringIO()
+    csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])
+    return stream.getvalue()

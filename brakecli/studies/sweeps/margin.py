@@ -1,0 +1,52 @@
+"""How far the friction at each point of a sweep is from the critical one: in a map its zero is a line."""
+
+from math import prod
+
+import numpy as np
+from numpy.typing import NDArray
+
+from brakecli.analysis.stability.report import LARGEST_FRICTION, critical_friction
+from brakecli.case.system import system_of
+from brakecli.errors import CaseError, RefusedError
+from brakecli.studies.runs.limits import within_range
+from brakecli.studies.sweeps.plan import Plan
+
+MOST_POINTS = 10**5
+"""Points of a sweep whose settings are listed to find these cases; a choice."""
+MOST = 2500
+MOST_ROUGH = 64
+"""Cases whose critical friction is looked for, smooth and rough ones; a sweep that needs more gets no line."""
+_FRICTION = ("friction", "coefficient")
+
+
+def margins(plan: Plan) -> NDArray[np.float64] | None:
+    """Critical friction less friction at every point of the grid, by eigenvalues; None where it would take long.
+
+    What is never stable is critical at 0, what no friction makes unstable at the largest friction searched. With a
+    wheel at rest, or numbers out of range, it is NaN.
+    """
+    settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= MOST_POINTS else []
+    others = {tuple(value for path, value in each.items() if path != _FRICTION): each for each in settings}
+    try:
+        rough = not all(system_of(plan.case(each)).smooth for each in settings[:: max(1, len(settings) - 1)])
+        if not others or len(others) > (MOST_ROUGH if rough else MOST):
+            return None
+        known = {key: _critical(plan, each) for key, each in others.items()}
+        own = plan.case({}).friction.coefficient
+    except CaseError:
+        return None
+    critical = [known[tuple(value for path, value in each.items() if path != _FRICTION)] for each in settings]
+    friction = [each.get(_FRICTION, own) for each in settings]
+    return np.reshape(np.array(critical) - np.array(friction, float), plan.shape)
+
+
+def _critical(plan: Plan, settings: dict[tuple[str, ...], object]) -> float:
+    system = system_of(plan.case(settings))
+    if system.belt_speed == 0.0:
+        return np.nan
+    try:
+        with within_range():
+            found = critical_friction(system, system.contact_stiffness)
+    except RefusedError:
+        return np.nan
+    return LARGEST_FRICTION if found is None else found

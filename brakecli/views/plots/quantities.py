@@ -1,0 +1,64 @@
+"""The quantities of a run that can be drawn, and the axes that they get: unit, round offset, limits."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from brakecli.views.plots import style
+
+VARIABLES = {  # what `--variable` may name: words, words at the axis with the symbol, symbol, unit
+    "x": ("tangential displacement", "displacement x", "x", "m"),
+    "y": ("normal displacement", "displacement y", "y", "m"),
+    "vx": ("tangential velocity", "velocity ẋ", "ẋ", "m/s"),
+    "vy": ("normal velocity", "velocity ẏ", "ẏ", "m/s"),
+    "friction_force": ("friction force on the shoe", "friction force $F_x$", "$F_x$", "N"),
+    "normal_force": ("normal contact force", "normal force $F_y$", "$F_y$", "N"),
+    "torque": ("braking torque", "braking torque $R F_x$", "$R F_x$", "N m"),
+    "contact_fraction": ("part of the pad that touches", "touching part of the pad", "the touching part", ""),
+}
+CENTRED = 0.02  # of the middle of values: if they move by less, the axis counts from a centre
+STILL = 1e-6  # of the whole run's motion: a smaller one is drawn as a line
+
+
+@dataclass(frozen=True)
+class Scaled:
+    """How values are drawn along an axis: with which words, in which unit, and less which round number."""
+
+    label: str
+    unit: str
+    factor: float
+    centre: float = 0.0
+    limits: tuple[float, float] | None = None  # where the values are constant
+
+    def __call__(self, values: style.Array) -> style.Array:
+        """The values to be drawn."""
+        return self.factor * (values - self.centre)
+
+
+def scaled(variable: str, values: style.Array, whole: style.Array, also: float = 0.0) -> Scaled:
+    """The axis of values in SI units, as small as they are in the whole run, where `also` is drawn beside them."""
+    _, name, _, unit = VARIABLES[variable]
+    largest = max(style.largest(whole), also)
+    moves = float(np.ptp(values))
+    if moves <= max(STILL * float(np.ptp(whole)), style.ROUNDING * largest):
+        middle = float(np.median(values))
+        half = 0.05 * largest or 1.0
+        factor, unit = style.prefixed(abs(middle) + half, unit)
+        limits = factor * (middle - half), factor * (middle + half)
+        return Scaled(style.labelled(name, unit), unit, factor, limits=limits)
+    if centre := _centre(values) if unit != "m/s" else 0.0:
+        less, its_unit = style.prefixed(abs(centre), unit)
+        name += f" {'−' if centre > 0.0 else '+'} {less * abs(centre):.12g} {its_unit}".rstrip()
+    factor, unit = style.prefixed(max(style.largest(values - centre), also), unit)
+    return Scaled(style.labelled(name, unit), unit, factor, centre)
+
+
+def _centre(values: style.Array) -> float:
+    """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
+    middle = 0.5 * float(values.min() + values.max())
+    width = float(np.ptp(values))
+    if not 0.0 < width < CENTRED * abs(middle):
+        return 0.0
+    digits = math.ceil(math.log10(abs(middle) / width))
+    return float(f"{middle:.{digits}e}")

@@ -1,0 +1,126 @@
+"""The Poincaré section of a run: its state once in each period of a passing wave, or at each event of a kind."""
+
+import math
+
+import numpy as np
+from matplotlib.figure import Figure
+from scipy.interpolate import CubicHermiteSpline
+
+from brakecli.case.system import system_of
+from brakecli.errors import UsageError
+from brakecli.faces import argument
+from brakecli.results.numbers import stored_numbers
+from brakecli.results.read import BLOCK, StoredResult
+from brakecli.solver.period import common_period
+from brakecli.views.motion import motion_sentence
+from brakecli.views.plots import style
+from brakecli.views.plots.quantities import scaled
+from brakecli.views.plots.run import case_of
+from brakecli.views.render import TERMINAL
+
+MOST = 200_000  # samples whose time is drawn, the last ones
+WAVE = "wave"
+KINDS = ("stick", "slip", "turn", "lift-off", "touch")
+_WITH_THE_WHEEL = KINDS[:3]  # where vx is the wheel's speed
+_FEWEST = 8  # samples in a period between which a state is certain
+_SPREAD = 0.01  # of the motion: dots that spread further fill the axes; others are one dot on the motion
+_ROOM = 0.54  # of the spread of the dots, to each side of their middle
+_STATE = ("x", "y", "vx", "vy")
+_Points = dict[str, style.Array]
+
+
+def draw(result: StoredResult, section: str) -> Figure:
+    """The figure; raises UsageError for a section that the run does not have, and UnreadableResultError."""
+    samples = result.variables("history")["time"].shape[0]
+    if samples < 2:
+        raise style.unreadable(result, "its history has less than two samples")
+    start, end = (float(result.read("history", "time", at, at + 1)[0]) for at in (0, samples - 1))
+    time = start, end, (end - start) / (samples - 1)
+    settled = min(max(float(result.attributes.get("settled_from") or 0.0), start), end)
+    first = max(min(round((settled - start) / time[2]), samples - 2), samples - MOST)
+    begin = max(settled, start + first * time[2])
+    if section == WAVE:
+        points, where = _at_waves(result, time, begin)
+    elif section in KINDS:
+        points = _at_events(result, section, begin)
+        where = f"at each {section}"
+    else:
+        known = ", ".join((WAVE, *KINDS))
+        raise UsageError(f"{argument('section')} {section}: there is no such section; give one of {known}")
+    last = {name: result.read("history", name, first) for name in _STATE}
+    count = f"{len(points['x'])} points from {begin:.4g} s on"
+    title = case_of(result).case.title or "Case without a title"
+    verdict = motion_sentence(stored_numbers(result), TERMINAL)  # how the dots are to be read: a torus, chaos
+    lines = f"Poincaré section {where}   ·   {count}", verdict
+    figure = style.headed(10.4, 4.81, title, *lines, columns=2, wspace=0.05)
+    pairs = (("x", "y"), ("x", "vy")) if section in _WITH_THE_WHEEL else (("x", "vx"), ("y", "vy"))
+    spreads = {name: (float(np.ptp(points[name])), float(np.ptp(last[name]))) for name in _STATE}
+    for axes, pair in zip(style.panels(figure, 1, 2).flat, pairs, strict=True):
+        near = any(spread > _SPREAD * whole for spread, whole in map(spreads.__getitem__, pair))
+        shown = points if near else last
+        looks = [scaled(name, shown[name], np.r_[last[name], points[name]]) for name in pair]
+        motion, dots = (
+            [look(found[name]) for name, look in zip(pair, looks, strict=True)] for found in (last, points)
+        )
+        axes.plot(*motion, color=style.GREY, lw=0.4, alpha=0.6 if near else 1.0, label="motion", rasterized=True)
+        axes.plot(*dots, color=style.BLUE, ls="none", marker=".", label="section")
+        axes.set(xlabel=looks[0].label, ylabel=looks[1].label, xlim=looks[0].limits, ylim=looks[1].limits)
+        for name, look, values, limit in zip(pair, looks, dots, (axes.set_xlim, axes.set_ylim), strict=True):
+            if near:
+                spread, whole = spreads[name]
+                middle = 0.5 * float(values.min() + values.max())
+                half = look.factor * max(_ROOM * spread, 0.5 * _SPREAD * whole)
+                limit(middle - half, middle + half)
+    return figure
+
+
+def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: float) -> tuple[_Points, str]:
+    """The states once in each period of the wave that moves x most, or else of the highest one; words for it.
+
+    `time` is that of the first and of the last sample, and between two of them (s).
+    """
+    system = system_of(case_of(result).case)
+    passing = np.abs(system.belt_speed) * system.wheel.turns
+    if not system.steady or not passing.any():
+        remedy = f"give an event: {', '.join(KINDS)}"
+        raise UsageError(
+            f"{argument('section')} {WAVE}: no wave of a rough wheel passes at a constant speed; {remedy}"
+        )
+    forced = result.attributes.get("forced_frequency")
+    wave = np.argmin(np.abs(passing - forced)) if forced else np.argmax(np.abs(system.wheel.g))
+    frequency = float(passing[wave])
+    start, end, interval = time
+    if frequency * interval > 1.0 / _FEWEST:
+        what = f"samples every {interval:.3g} s do not resolve the wave of {frequency:.4g} Hz"
+        raise UsageError(
+            f"{argument('section')} {WAVE}: {what}; "
+            f"run with output.sample_interval={1.0 / frequency / _FEWEST:.2g}"
+        )
+    times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1) / frequency
+    if not len(times):
+        raise UsageError(f"{argument('section')} {WAVE}: less than a period from {begin:.4g} s on; run longer")
+    places = np.minimum((times - start) / interval, (end - start) / interval - 1.0).astype(int)
+    parts = []
+    for first in range(int(places[0]), int(places[-1]) + 1, BLOCK):
+        there = times[(places >= first) & (places < first + BLOCK)]
+        part = (first, first + BLOCK + 1)
+        known, x, y, v_x, v_y = (result.read("history", name, *part) for name in ("time", *_STATE))
+        curves = [CubicHermiteSpline(known, *each) for each in ((x, v_x), (y, v_y))]
+        parts.append([curve(there, order) for order in (0, 1) for curve in curves])
+    found = {name: np.concatenate(each) for name, each in zip(_STATE, zip(*parts, strict=True), strict=True)}
+    together = round((common_period(system) or 0.0) * frequency)
+    repeat = f"; the waves repeat together every {together} dots" if together > 1 else ""
+    return found, f"at each wave of {frequency:.4g} Hz{repeat}"
+
+
+def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
+    """The states at the events of a kind."""
+    if "events" not in result.file:
+        remedy = f"run its case again with {argument('set')} output.events=true"
+        raise UsageError(f"{argument('section')} {kind}: {result.path} holds no events; {remedy}")
+    there = result.read("events", "time") >= begin
+    kinds = result.read("events", "kind")[there]
+    if kind not in kinds:
+        known = f"give one of {', '.join(sorted({*kinds.tolist()}))}" if len(kinds) else "run longer"
+        raise UsageError(f"{argument('section')} {kind}: {result.path} has none from {begin:.4g} s on; {known}")
+    return {name: result.read("events", name)[there][kinds == kind] for name in _STATE}

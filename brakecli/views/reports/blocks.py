@@ -1,0 +1,167 @@
+"""What a page is made of: sections with tables, pictures and texts, which the template `report.html` writes."""
+
+import base64
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from io import BytesIO
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from PIL import Image
+
+from brakecli.results.field import Field
+from brakecli.studies.runs.advise import AdviceReport
+from brakecli.studies.sweeps.result import unit
+from brakecli.views.plots import style
+from brakecli.views.render import Renderer
+from brakecli.views.view import Row, View, sentences
+from brakecli.views.view import Table as Columns
+
+Numbers = Mapping[str, tuple[Any, str]]
+"""What results are compared by: values with their units, by their names."""
+
+# of a picture: a third of the bytes, and no difference that could be seen
+_COLOURS = 255
+_DPI = 120
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows of texts, with a header or without; one that is `folded` under its title opens on demand.
+
+    Numbers of rows that are `marked` are those that a reader is to see first.
+    """
+
+    rows: Sequence[Sequence[str]]
+    head: Sequence[str] = ()
+    folded: str = ""
+    marked: Collection[int] = ()
+    kind = "table"
+
+
+@dataclass(frozen=True)
+class Texts:
+    """Sentences."""
+
+    lines: Sequence[str]
+    kind = "texts"
+
+
+@dataclass(frozen=True)
+class Code:
+    """A text to be copied, folded under a title if there is one."""
+
+    text: str
+    folded: str = ""
+    kind = "code"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture for wide and for narrow screens, with the words for those who do not see it."""
+
+    words: str
+    wide: str
+    narrow: str
+    kind = "picture"
+
+
+@dataclass(frozen=True)
+class Section:
+    """A headline with what stands below it."""
+
+    title: str
+    blocks: Sequence[Any]
+
+
+@dataclass(frozen=True)
+class Part:
+    """What the page says of one result: its first page, then the `sections` of the appendix."""
+
+    name: str
+    title: str
+    question: str
+    answer: Sequence[str]
+    picture: Picture | None
+    change: Sequence[Any]  # blocks that say what to change
+    sections: Callable[[], Sequence[Section]]
+    numbers: Numbers
+    versions: Mapping[str, str] = field(default_factory=dict)
+    advice: AdviceReport | None = None  # of a run
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Results beside each other, named by what differs: a picture of all together, or one of each."""
+
+    title: str
+    best: str  # a sentence; empty where nothing tells one from the other
+    names: Sequence[str]
+    titles: Sequence[str]  # of their own pages
+    changed: Sequence[Any]  # blocks
+    numbers: Table
+    pictures: Sequence[Picture]
+
+
+def picture(words: str, draw: Callable[[], Figure]) -> Picture:
+    """The picture that a function draws, for both widths."""
+    images = []
+    for narrow in (False, True):
+        with style.applied(narrow, titled=False):
+            png = Image.open(BytesIO(style.rendered(draw(), ".png", _DPI))).convert("RGB")
+        stream = BytesIO()
+        few = png.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)  # rare colours, too
+        few.save(stream, "png", optimize=True)
+        images.append("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode())
+    return Picture(words, images[0], images[1])
+
+
+def _prefixed(value: Any, unit: str) -> str:
+    if isinstance(value, int | np.integer) and not unit:
+        return f"{int(value):,}".replace(",", "\u202f").replace("-", "−")
+    factor, unit = style.prefixed(abs(float(value)), unit)
+    return f"{style.readable(factor * float(value))} {unit}".rstrip().replace(" ", "\u00a0")
+
+
+PAGE = Renderer(_prefixed, "–", most=8, each=True)
+"""A page writes a prefix where a number needs one."""
+shown = PAGE.text
+
+
+def blocks_of(view: View) -> list[Any]:
+    """The numbers and tables of a view, as a page writes them."""
+    found = list[Any]()
+    for kind, blocks in groupby(view.blocks, type):
+        if kind is Row:
+            found.append(Table([(each.label, each.text) for each in blocks if isinstance(each, Row)]))
+            continue
+        for each in blocks:
+            if isinstance(each, Columns):
+                found.append(Texts(sentences([each.title])))
+                found.append(Table([*zip(*each.columns.values(), strict=True)], [*each.columns]))
+    return found
+
+
+def percent(part: float) -> str:
+    """A change, as a part of what was there before, in per cent."""
+    return f"{100.0 * part:+.3g}\u00a0%".replace("-", "−")
+
+
+def rounded(value: Any, digits: int) -> Any:
+    """A number to so many digits; anything else as it is."""
+    return float(f"{value:.{digits}g}") if isinstance(value, float) else value
+
+
+def key_unit(key: str) -> str:
+    """The unit of a key of the case; empty where it has none, or where a case has no such key."""
+    with suppress(KeyError):
+        return unit(key)
+    return ""
+
+
+def numbers_of(known: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
+    """The values of some fields, None where there is none."""
+    return {each.title: (values.get(each.name), each.units) for each in known}

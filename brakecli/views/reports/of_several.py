@@ -1,0 +1,147 @@
+"""Two or three results of one kind beside each other: what was changed, and what became of it."""
+
+import math
+import textwrap
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
+
+from brakecli.errors import UsageError
+from brakecli.results.contents import keys
+from brakecli.results.read import StoredResult
+from brakecli.studies.runs.advise import AdviceReport
+from brakecli.studies.scattering.answers import listed
+from brakecli.views.plots import over_each_other
+from brakecli.views.reports.blocks import Beside, Part, Table, Texts, key_unit, percent, picture, rounded, shown
+from brakecli.views.view import sentence
+
+PICTURE = "All results in one picture: the first one wide, the second one dashed"
+THIRD = ", the third one dotted"
+# to which numbers are compared; increase above which there is no per cent
+DIGITS = 4
+MOST_PART = 10.0
+# rows of both tables on a single page, and letters of the keys that are left out
+_MOST_KEYS = 5
+_MOST_NUMBERS = 9
+_MOST_LETTERS = 180
+_NARROW = 2  # results whose picture stands beside their numbers, and not below them
+_NAMED = 2  # changed keys by which the results are named
+_CHOSEN = "solver.duration", "output.sample_interval"  # by the program, where a file gives no numbers
+_SAME = "same"
+
+
+def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -> Beside | None:
+    """What a page says of all of them together, if they are of one kind; rows that are many only if it is `full`.
+
+    Raises UnreadableResultError.
+    """
+    if len({str(result.attributes.get("kind")) for result in results}) != 1:
+        return None
+    given = [keys(result, ("case_toml",)) for result in results]
+    fixed = [name for name in _CHOSEN if any(isinstance(each.get(name), int | float) for each in given)]
+    case = list[tuple[Any, ...]]()
+    chosen = list[str]()
+    every = [keys(result) for result in results]
+    for name in dict.fromkeys(name for each in every for name in each):
+        values = [each.get(name) for each in every]
+        if all(value == values[0] for value in values):
+            continue
+        texts = [shown(value, key_unit(name)) for value in values]
+        if name in _CHOSEN and name not in fixed:
+            chosen += [f"{name} ({', '.join(texts)})"] * (len({*texts}) > 1)
+        elif name != "title" and {} not in values:  # which stands for a table without keys
+            case.append((name, *values, key_unit(name)))
+    known = {name: units for part in parts for name, (_, units) in part.numbers.items()}
+    numbers = []
+    for name, units in known.items():
+        values = [rounded(part.numbers.get(name, (None,))[0], DIGITS) for part in parts]
+        if {*map(str, values)} - {"None", ""}:
+            numbers.append((name, *values, units))
+    single = [row for row in case if all(isinstance(each, str | int | float) for each in row[1:-1])][:_NAMED]
+    apart = [
+        ", ".join(f"{row[0]} = {shown(row[side], row[-1])}" for row in single) for side in range(1, len(parts) + 1)
+    ]
+    names = [", ".join(filter(None, pair)) for pair in zip((part.name for part in parts), apart, strict=True)]
+    letters = "ABC"[: len(parts)]
+    files = [f"{letter}: {part.name}" for letter, part in zip(letters, parts, strict=True)]
+    try:
+        draw = partial(over_each_other.draw, results, "", files, in_a_row=len(parts) > _NARROW)
+        pictures = [picture(PICTURE + THIRD * (len(parts) > _NARROW), draw)]
+    except UsageError:  # no curves that could be drawn over each other
+        pictures = [each.picture for each in parts if each.picture]
+    titles = [part.title for part in parts]
+    title = " – ".join(titles)
+    if len({*titles}) == 1:
+        steps = [f"{name} {' → '.join(shown(each, units) for each in values)}" for name, *values, units in single]
+        title = f"{titles[0]}: {', '.join(steps) or ' – '.join(names)}"
+        titles = [": ".join(filter(None, pair)) for pair in zip(titles, apart, strict=True)]
+    head = ("", *letters, *(f"{letter} against A" for letter in letters[1:]))
+    most = len(case) if full else _MOST_KEYS
+    blocks: list[Any] = [_table(case[:most], head) if case else Texts(["The cases are the same."])]
+    if more := ", ".join(name for name, *_ in case[most:]):
+        blocks.append(Texts([f"Different, too: {textwrap.shorten(more, _MOST_LETTERS, placeholder=' …')}."]))
+    if not full:  # what is the same is no news
+        numbers = [row for row in numbers if len({*map(str, row[1:-1])}) > 1][:_MOST_NUMBERS]
+    if chosen:
+        blocks.append(Texts([f"Not given as numbers in the files, and different, too: {', '.join(chosen)}."]))
+    advice = [each.advice for each in parts if each.advice]
+    best = best_of(dict(zip(letters, advice, strict=True))) if len(advice) == len(parts) else ""
+    return Beside(title, best, names, titles, blocks, _table(numbers, head), pictures)
+
+
+def best_of(designs: Mapping[str, AdviceReport]) -> str:
+    """Which designs are best against squeal, and by what; empty where one of them does not slide.
+
+    Those whose critical friction is largest, over their own, and of which fewest squeal under a scatter. Margins
+    are told apart by their first digits, as numbers of a page are, and shares where their 95 % intervals do not
+    meet.
+    """
+    if any(each.stability.equilibrium is None or not each.stability.belt_speed for each in designs.values()):
+        return ""
+    times = {name: _times(each) for name, each in designs.items()}
+    far = [name for name, each in times.items() if each == max(times.values())]
+    finite = [f"{each:.4g} for {name}" for name, each in times.items() if math.isfinite(each)]
+    by = [f"critical friction over own friction is {listed(finite)}"] if finite else []
+    by += [f"no friction makes {name} squeal" for name, each in times.items() if math.isinf(each)]
+    seldom = [*designs]
+    left = {name: each.squeal for name, each in designs.items() if each.squeal}
+    if len(left) == len(designs):
+        least = min(left.values())
+        seldom = [name for name, each in left.items() if each.squeal_lower <= least.squeal_upper]
+        shares = listed([f"{100.0 * each.squeal_probability:.2g} % of {name}" for name, each in left.items()])
+        by.append(f"under a scatter {next(iter(designs.values())).scatter} {shares} squeal")
+    both = [name for name in far if name in seldom]
+    better, larger, fewer = ("better", "larger", "fewer") if len(designs) == 2 else ("best", "largest", "fewest")
+    said = f"the {larger} margin is that of {listed(far)}, but {fewer} squeal of {listed(seldom)}"
+    if len(both) == len(designs):
+        said = f"{listed(both)} do not differ in what decides on squeal"
+    elif both:
+        said = f"{listed(both)} {'is' if len(both) == 1 else 'are'} {better} against squeal"
+    return sentence(f"{said}: {'; '.join(by)}")
+
+
+def _times(advice: AdviceReport) -> float:
+    """Critical friction over a design's own; infinite where no friction makes it unstable, or none acts."""
+    return math.inf if advice.margin is None else float(f"{1.0 + advice.margin:.{DIGITS}g}")
+
+
+def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:
+    """Name, all values, and by how much they differ from the first, of rows that end with the unit."""
+    found = list[tuple[str, ...]]()
+    marked = list[int]()
+    for name, first, *others, units in rows:
+        changes = [_change(first, other) for other in others]
+        if {*changes} != {_SAME}:
+            marked.append(len(found))
+        found.append((name, *(shown(each, units) for each in (first, *others)), *changes))
+    return Table(found, head, marked=marked)
+
+
+def _change(a: Any, b: Any) -> str:
+    if a == b:
+        return _SAME
+    if a and all(isinstance(each, int | float) and not isinstance(each, bool) for each in (a, b)):
+        part = b / a - 1.0
+        if -1.0 <= part < MOST_PART:
+            return percent(part)
+    return "differs"
