@@ -2,7 +2,8 @@
 
 Weighed are names, operators, numbers and texts, the tokens of Python without comments and docstrings, of each room
 and in all. Counted is what makes code hard to read: assignments that pack unlike things into one line, calls with
-starred arguments, `Any`, numbers at the top of modules, and private pieces of Numba. Named are files beyond 500
+starred arguments, `Any`, numbers at the top of modules, private pieces of Numba, and names that say nothing of what
+they name. Named are files beyond 500
 lines, functions beyond 80 lines, and signatures beyond eight arguments. Options of commands and functions of
 `import brakecli` may have more.
 """
@@ -26,6 +27,8 @@ PRIVATE = re.compile(
     r"|_cache_file|_index_key|__class__ =|no_cpython_wrapper|no_cfunc_wrapper"
 )
 """What of Numba is not promised to stay."""
+EMPTY = set("each found part place known rest left held told given seen asked kept".split())
+"""Words that do not name things: they change their meaning from room to room."""
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -72,6 +75,14 @@ def holds_a_number(node: ast.stmt) -> bool:
     return any(type(each.value) in (int, float) for each in constants)
 
 
+def names_nothing(node: ast.AST) -> bool:
+    """Whether a name, or the use of one, is a word that does not name a thing."""
+    for kind, attribute in ((ast.Name, "id"), (ast.Attribute, "attr"), (ast.arg, "arg"), (ast.keyword, "arg")):
+        if isinstance(node, kind):
+            return str(getattr(node, attribute)).strip("_") in EMPTY
+    return isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name.strip("_").lower() in EMPTY
+
+
 def counts(text: str, tree: ast.Module) -> Counter[str]:
     """What is counted in one module, by its name."""
     found = Counter[str]()
@@ -81,6 +92,7 @@ def counts(text: str, tree: ast.Module) -> Counter[str]:
         found["functions"] += isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
         found["packed assignments"] += is_packed(node)
         found["starred calls"] += is_starred(node)
+        found["names of nothing"] += names_nothing(node)
         found["Any"] += isinstance(node, ast.Name) and node.id == "Any"
     found["numbers at module level"] = sum(map(holds_a_number, tree.body))
     found["private Numba"] = len(PRIVATE.findall(text))
