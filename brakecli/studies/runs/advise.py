@@ -96,7 +96,7 @@ class AdviceReport:
         load = abs(self.system.load_at_start)
         found = []
         if rest is not None and rest.normal_force < _PRESSED_PART * load:
-            pressed = f"{rest.normal_force:.3g} N press the shoe on"
+            pressed = f"{float(f'{rest.normal_force:.3g}'):g} N press the shoe on"
             found.append(f"of the load of {load:g} N, {pressed}; the links carry the rest")
         if rest is not None and 0.0 < rest.contact_fraction < 1.0:
             instead = 'a sweep with method = "simulation" follows the motion itself'
