@@ -38,28 +38,24 @@ from benchmarks.extremes.points import DRAWN, POINTS, Family, campaign, drawn, t
 PAGE = Path(__file__).parents[2] / "docs" / "extremes.md"
 INTRODUCTION = """# The extremes
 
-`make extremes` writes this page; all its numbers come from `benchmarks/extremes`.
-One quantity at a time is varied far beyond the range of any brake, in both directions. The base case is a shoe
-that sticks, slips and vibrates on a smooth wheel, or one on a rough wheel whose pad opens in part. Each scheme
-computes each point from rest, over {periods:g} periods of the fastest motion with {steps} steps per period, except
-where the step is varied. The event-driven scheme runs to a certified tolerance of {event:g}, as in
-`brakecli run`. The outcome of a run is one of these:
+What comes of numbers far beyond those of any brake? `make extremes` writes this page.
+
+One quantity at a time is varied. The base case is a shoe that vibrates with stick on a smooth wheel, or one on a
+rough wheel whose pad opens in part. Each scheme computes {periods:g} periods of the fastest motion from rest, with
+{steps} steps per period unless the step is varied. The event-driven scheme has a tolerance of {event:g}.
 
 - **right**: the errors of x, y, ẋ and ẏ, relative to the largest value of each, are below a bound. The reference
-  is the event-driven scheme at {truth:g}. With ω of the fastest motion, r the rate of overcritical dashpots, p the
-  order of the scheme, T the duration, σ the growth rate of the motion and n the nodes per wave, the bound is
-  [2(ωh)^p ωT + 2(rh)^p + 2/n² + j] e^(σT), where n counts as at least {coarsest:g}. The term j is the change of ẋ
-  in one step by the largest jump of friction, because steps of fixed length do not know when in a step friction
-  jumps. The bound of the event-driven scheme is its tolerance. No error above {most:g} is right.
-- **warned**: the error exceeds the bound, and a warning of `brakecli check` or of the run names the key and the
-  number that cause this.
+  is the event-driven scheme at {truth:g}. The bound is [2(ωh)^p ωT + 2(rh)^p + 2/n² + j] e^(σT), with ω of the
+  fastest motion, r the rate of overcritical dashpots, p the order of the scheme, T the duration, σ the growth rate
+  and n the nodes per wave, at least {coarsest:g}. j is the change of ẋ in one step by the largest jump of
+  friction. The bound of the event-driven scheme is its tolerance. No error above {most:g} is right.
+- **warned**: the error exceeds the bound, and a warning names the key and the number that cause this.
 - **refused**: `brakecli run` refuses the case and says why.
 - **failed by name**: the run ends with a failure that has a name and a remedy.
 - **silently wrong**: the error exceeds the bound, and no message says so. There must be none.
 
-The bound applies to a few periods. The phase error of an undamped vibration continues to grow at the same rate,
-(ωh)²/12 per radian at weights of one half. So a run of thousands of periods needs more steps per period, or
-`solver.tolerance` in place of `solver.step`.
+The bound applies to a few periods. The phase error of an undamped vibration grows on, by (ωh)²/12 per radian at
+weights of one half. A run of thousands of periods needs more steps per period, or `solver.tolerance`.
 """
 
 
@@ -109,7 +105,7 @@ def outcomes_text(points: Sequence[Point]) -> str:
 
 {table(["scheme", *KINDS], counts)}
 
-The table gives the number of points that are right, and their largest error:
+The number of points that are right, and their largest error:
 
 {table(["varied", "range", "unit", *(scheme.text for scheme in SCHEMES)], ranges)}
 
@@ -146,13 +142,12 @@ def together_text() -> str:
     told = "\n".join((heading, "", *wrong)) if wrong else "None is silently wrong."
     return f"""## Several at a time
 
-{POINTS} points on smooth surfaces are drawn with a fixed seed. At each, three of these quantities are drawn, in SI
-units and evenly in their logarithms. Each of the two angles is drawn at a third of the points.
+At each of {POINTS} random points on smooth surfaces three of these quantities are drawn, in SI units and evenly in
+their logarithms. Each of the two angles is drawn at a third of the points.
 
 {ranges}
 
-The bound above applies to one quantity at a time. Here a run is right if its error is at most {MOST_ERROR:g}, or,
-with the event-driven scheme, at most its tolerance.
+Here a run is right if its error is at most {MOST_ERROR:g}. Of the event-driven scheme it is the tolerance at most.
 
 {table(["scheme", *KINDS, "median error of right ones", "largest"], rows)}
 
@@ -183,10 +178,9 @@ def limits_text() -> str:
         rows.append([name, *cells])
     return f"""## Limits of stability
 
-The table gives the largest stable step times ω of the fastest motion on the springs, without friction. The first
-value is the prediction of `brakecli stability`. The second one is observed in runs of {LIMIT_STEPS} steps from a
-small disturbance, by bisection. "none" means no limit up to {MOST_LIMIT:g}. The event-driven scheme finds its
-steps itself and has no limit.
+The largest stable step times ω of the fastest motion, without friction: first as `brakecli stability` predicts it,
+then as seen in runs of {LIMIT_STEPS} steps. "none" means no limit up to {MOST_LIMIT:g}. The event-driven scheme
+has none.
 
 {table(["shoe", *(scheme.text for scheme in LIMITED)], rows)}
 """
@@ -197,9 +191,9 @@ def drift_text() -> str:
     rows = [[scheme.text, *(f"{drift(scheme, count):.1e}" for count in (10, 100))] for scheme in SCHEMES]
     return f"""## Drift of energy
 
-The table gives the relative change of the energy of a free vibration in full contact, without dashpots and
-friction, over {DRIFT_STEPS} steps with 10 and with 100 steps per period. The event-driven scheme computes the
-same periods in one run to {EVENT_TOLERANCE:g}. The weights (1, 1) take all of it; `brakecli check` warns of this.
+The relative change of the energy of a free vibration over {DRIFT_STEPS} steps, without dashpots and friction. The
+event-driven scheme computes the same periods to {EVENT_TOLERANCE:g}. The weights (1, 1) take all of it;
+`brakecli check` warns of this.
 
 {table(["scheme", "10 steps per period", "100 steps per period"], rows)}
 """
@@ -210,11 +204,10 @@ def hours_text() -> str:
     rows = [[scheme.text, f"{hours(scheme):.0e}"] for scheme in SCHEMES]
     return f"""## Hours of motion
 
-A run of a heavy shoe on a rough wheel over {HOURS:g} s is compared with a run over {SETTLING:g} s. The wheel of
-the short run starts with the phases that the wheel of the long run has {SETTLING:g} s before its end; they are
-computed in fractions. Both motions have settled. The table gives the largest difference in their last 10 s,
-relative to the range of each quantity there. It is rounding or, with the event-driven scheme, the error of one run
-to {EVENT_TOLERANCE:g}.
+A run of a heavy shoe on a rough wheel over {HOURS:g} s ends like one over {SETTLING:g} s that begins with the
+wheel's phases {SETTLING:g} s before that end. The table gives the largest difference in the last 10 s, relative to
+the range of each quantity. It is rounding. With the event-driven scheme it is the error of a run to
+{EVENT_TOLERANCE:g}.
 
 {table(["scheme", "difference"], rows)}
 """

@@ -45,56 +45,6 @@ LONG_REFERENCE = 1e-10
 TURN_SECONDS = 3.0
 AGAINST_LSODA = {("S", 0.02): 5, ("B", 0.02): 3, ("C", 0.02): 5, ("S", 0.5): 12, ("B", 0.5): 3, ("C", 0.5): 10}
 AGAINST_SCIPY = {"S": 500, "B": 70, "C": 100}
-_ON_S = (
-    "S over 20 ms takes 8 µs: 1.5 for the call and the clock, 2 for the matrices of the phases and of their works,"
-    " 2.5 for 80 steps, 2 for two events. heyoka.py takes fewer and longer steps, and fills in the samples."
-)
-_ON_ROUGH = (
-    "B and C: the error decides on the steps, which are of order five: B takes 500 evaluations in 20 ms at 1e-3, a"
-    " sixth of them at samples, whose forces peers leave out. An evaluation takes 95 ns with 256 nodes, and 30 in"
-    " full contact; half of the time goes into the rest of a step: stages, powers, the angles of the waves,"
-    " events. Steps of two passing waves instead of half of one would save at most 5 %."
-)
-REASONS = {
-    "numbalsoda LSODA: S, 0.5 s": (
-        "S over 0.5 s at 1e-2 and 1e-3: an exact motion costs the same at every error, and LSODA "
-        "gets cheaper as errors may grow."
-    ),
-    "numbalsoda LSODA: S": _ON_S,
-    "numbalsoda DOP853: S": _ON_S,
-    "heyoka.py: S": _ON_S,
-    "numbalsoda": _ON_ROUGH,
-    "SciPy": "SciPy has a compiled right-hand side and its cheapest method at each error, LSODA on S.",
-    "critical: a smooth point": (
-        "Critical values: following limit cycles, for what can coexist, takes nearly all of the time; by"
-        " eigenvalues a point takes 3 ms."
-    ),
-    "heyoka.py: relaxation": (
-        "relaxation.toml: 694 events and 4,400 steps take 0.55 ms, setting up and closing the account 0.1 to 0.2."
-    ),
-    "promise": (
-        "A promise on B: a run that knows its error looks at the contact at three to twelve more places of a step,"
-        " and takes 2.6 times as long as one that does not. Over 20 ms half of the time goes into making and"
-        " closing it."
-    ),
-    "one evaluation": (
-        "One evaluation: the compiler does not know the number of waves; and ours counts the nodes that are near"
-        " to zero gap, too, and takes the rise of the surface from six neighbours instead of two."
-    ),
-    "map of regimes": (
-        "The map of regimes: a point whose verdict comes early takes 0.3 ms, a quarter of it for its case."
-        " One in a hundred, beside the critical friction, runs to its end: thirty times as long."
-    ),
-    "map on B": (
-        "The map on B: a point takes some 1.4 ms of a core. Its promise takes 3,200 steps in a lane, 0.3 ms, two"
-        " thirds of it for the nodes of pads that open. The verdict takes 0.4 ms: 0.06 to find where waves meet,"
-        " the rest for levels, windows and words; linear theory is computed for 64 points at once, in 0.04. Case,"
-        " check and record take 0.2 ms, one point at a time in Python. A worker takes 0.8 s to start, nearly all"
-        " of it to load libraries and kernels."
-    ),
-    "critical: an open": "Critical values of open pads: growth is measured by runs, one after the other.",
-}
-"""Why a goal is missed, by the beginning of its name; the first that fits."""
 GUARD = (
     "How many times longer others take, larger is better. `make bench` fails where a ratio is more than"
     f" {100 * reached.LOSS:.0f} % below what was reached; `make bench BENCH_ARGS=--keep` raises that, and no"
@@ -123,8 +73,7 @@ class Report:
         lines = page.head(self.load, (time.perf_counter() - self.begin) / 60.0)
         if self.left:
             lines += [f"The run was interrupted: not measured are {', '.join(self.left)}.", ""]
-        lines += ["## To reach", "", *page.goals(self.goals, REASONS)]
-        lines += ["## What has been reached", "", GUARD, "", *reached.lines(self.before, self.ratios)]
+        lines += ["## Goals", "", *page.goals(self.goals)]
         lines += ["## Motions side by side", "", *page.absent(self.motions)] if self.motions else []
         for (name, duration), entries in self.motions.items():
             lines += page.side_by_side(f"{name}: {CASES[name]}", duration, entries)
@@ -323,7 +272,7 @@ def main() -> None:
         report.left.remove(name)
         if not wanted:
             page.write(report.lines())  # an interrupted run leaves what it has found
-    print("\n".join(report.lines()))
+    print("\n".join([*report.lines(), GUARD, "", *reached.lines(report.before, report.ratios)]))
     if fell := reached.fallen(report.before, report.ratios, whole=not wanted):
         sys.exit("\n".join(["less than what has been reached:", *fell]))
     if "--keep" in sys.argv:

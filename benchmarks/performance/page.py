@@ -91,14 +91,9 @@ def side_by_side(name: str, duration: float, entries: list[Entry]) -> list[str]:
     return [*lines, ""]
 
 
-def goals(found: list[Goal], reasons: dict[str, str]) -> list[str]:
+def goals(found: list[Goal]) -> list[str]:
     rows = [(what, goal, measured, "yes" if kept else "**no**") for what, goal, measured, kept in found]
-    lines = table(["", "goal", "measured", "reached"], rows)
-    if all(kept for *_, kept in found):
-        return lines
-    missed = [what for what, _, _, kept in found if not kept]
-    why = [next((why for begin, why in reasons.items() if what.startswith(begin)), "not known") for what in missed]
-    return [*lines, "Why the rest is not reached:", "", *dict.fromkeys(f"- {each}" for each in why), ""]
+    return table(["", "goal", "measured", "reached"], rows)
 
 
 def rates(found: list[Rate]) -> list[str]:

@@ -55,7 +55,7 @@ def raised(old: Ratios, new: Ratios) -> dict[str, float]:
 
 
 def lines(old: Ratios, new: Ratios) -> list[str]:
-    """The table of the page: a row for the ratios that differ in their error only."""
+    """The table that is printed: a row for the ratios that differ in their error only."""
     groups: dict[str, list[str]] = {}
     for name in {**old, **new}:
         groups.setdefault(name.partition(" at ")[0], []).append(name)

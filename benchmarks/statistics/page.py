@@ -16,25 +16,23 @@ BAR = 40  # signs of the longest bar
 MOST = 10  # half decades of the largest ratios that are told apart: a shoe at rest has no error
 INTRODUCTION = """# Estimates and errors
 
-`make statistics` writes this page. It draws {runs} random cases of ten kinds. Each has a random tolerance
-between 1e-2 and 1e-10 and is run as `brakecli run` runs it. The result is compared with a reference.
+Does a run keep its tolerance, and is its estimate above its error? `make statistics` runs {runs} random cases of
+ten kinds as `brakecli run` does, with tolerances between 1e-2 and 1e-10. It writes this page.
 
-The reference shares no code with `brakecli`. It integrates the contact force exactly, between the roots of the
-gap. Its steps have order 8 and compensated sums. It repeats a step until it ends at an event. It runs twice:
-the second run may be wrong by ten times as much in a step, and starts one rounding away. What the two differ by
-counts as the error of the reference.
+The reference shares no code with `brakecli`. It integrates the contact force exactly, in steps of order 8 that end
+at events. It runs a second time with ten times the error in a step, and from one rounding away. The difference
+counts as its error.
 
-- The **error** of a run is the largest deviation of $x$, $y$, $\\dot x$ and $\\dot y$ over all samples, each
-  relative to its largest value.
+- The **error** is the largest deviation of $x$, $y$, $\\dot x$ and $\\dot y$ over all samples, each relative to
+  its largest value.
 - The **estimate** is the `estimated_error` of the run.
-- A promise is **broken** if the run is certified and the error exceeds the tolerance. It is also broken if the
-  run is not certified and the error exceeds the tolerance before `certified_until`.
+- A promise is **broken** if the error exceeds the tolerance, before `certified_until` where the run is not
+  certified.
 - An estimate is **low** if the error exceeds it by more than the error of the reference.
 
-A run is compared as long as the reference is {better:g} times better than the tolerance. Cases are drawn until
-they do what their kind says: a kind with stick sticks, and a kind without stick does not. The cases *near
-grazing* are bisected. They just reach stick or lift-off, or just miss it, by 1e-2 to 1e-10 of the wheel's speed
-or of the start. The *amplifying* motions are self-excited, for up to 250 periods.
+A run is compared as long as the reference is {better:g} times better than the tolerance. Cases *near grazing* just
+reach stick or lift-off, or just miss it, by 1e-2 to 1e-10 of the wheel's speed or of the start. *Amplifying*
+motions are self-excited, for up to 250 periods.
 """
 
 
