@@ -47,7 +47,8 @@ rough wheel whose pad opens in part. Each scheme computes {periods:g} periods of
 - **right**: the errors of x, y, ẋ and ẏ, relative to the largest value of each, are below a bound. The reference
   is the event-driven scheme at {truth:g}. The bound is [2(ωh)^p ωT + 2(rh)^p + 2/n² + j] e^(σT). ω is that of the
   fastest motion, r the rate of overcritical dashpots, p the order of the scheme, T the duration, σ the growth
-  rate. n is the nodes per wave, at least {coarsest:g}, j the change of ẋ in one step by the largest jump of friction.
+  rate. n is the nodes per wave, at least {coarsest:g}, and j the change of ẋ in a step by the largest jump of
+  friction.
   The bound of the event-driven scheme is its tolerance. No error above {most:g} is right.
 - **warned**: the error exceeds the bound, and a warning names the key and the number that cause this.
 - **refused**: `brakecli run` refuses the case and says why.
