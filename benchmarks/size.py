@@ -1,11 +1,10 @@
 """How much the package weighs, and what in it is too long: `make size`.
 
-Weighed are names, operators, numbers and texts, the tokens of Python without comments and docstrings, of each room
-and in all. Counted is what makes code hard to read: assignments that pack unlike things into one line, calls with
-starred arguments, `Any`, numbers at the top of modules, private pieces of Numba, and names that say nothing of what
-they name. Named are files beyond 500
-lines, functions beyond 80 lines, and signatures beyond eight arguments. Options of commands and functions of
-`import brakecli` may have more.
+Weighed are names, operators, numbers and texts, the tokens of Python without comments and docstrings, of each
+room and in all. Counted is what makes code hard to read: assignments that pack unlike things into one line,
+calls with starred arguments, `Any`, numbers at the top of modules, private pieces of Numba, and names that say
+nothing of what they name. Named are files beyond 500 lines, functions beyond 80 lines, and signatures beyond
+eight arguments. Options of commands and functions of `import brakecli` may have more.
 """
 
 import ast
@@ -27,7 +26,9 @@ PRIVATE = re.compile(
     r"|_cache_file|_index_key|__class__ =|no_cpython_wrapper|no_cfunc_wrapper"
 )
 """What of Numba is not promised to stay."""
-EMPTY = set("each found part place known rest left held told given seen asked kept".split())
+EMPTY = set(
+    ["each", "found", "part", "place", "known", "rest", "left", "held", "told", "given", "seen", "asked", "kept"]
+)
 """Words that do not name things: they change their meaning from room to room."""
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 
