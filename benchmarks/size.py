@@ -26,9 +26,21 @@ PRIVATE = re.compile(
     r"|_cache_file|_index_key|__class__ =|no_cpython_wrapper|no_cfunc_wrapper"
 )
 """What of Numba is not promised to stay."""
-EMPTY = set(
-    ["each", "found", "part", "place", "known", "rest", "left", "held", "told", "given", "seen", "asked", "kept"]
-)
+EMPTY = {
+    "each",
+    "found",
+    "part",
+    "place",
+    "known",
+    "rest",
+    "left",
+    "held",
+    "told",
+    "given",
+    "seen",
+    "asked",
+    "kept",
+}
 """Words that do not name things: they change their meaning from room to room."""
 Documented = ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef
 

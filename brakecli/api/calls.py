@@ -25,7 +25,7 @@ def called() -> Iterator[None]:
     Objects of xarray have the accessor from then on. Profiles that are arrays are forgotten at the end.
     """
     import brakecli.views.accessor  # noqa: F401
-    from brakecli.case.profile import arrays
+    from brakecli.case.records import arrays
 
     hears = threading.current_thread() is threading.main_thread()
     before = arrays.set({})

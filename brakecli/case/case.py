@@ -12,7 +12,6 @@ from pydantic import Field
 
 from brakecli.case import tables
 from brakecli.case.parts import SETTLED, Contact, Friction, Initial, Link, Load, Output, Shoe, Solver, Wheel
-from brakecli.case.restart import initial_at, last_of
 from brakecli.case.roughness import NEEDLESS, Roughness, record_of, surface_of
 from brakecli.case.tables import ROUNDED, Table, described
 from brakecli.errors import BrakecliError, Problem
@@ -94,6 +93,8 @@ class Case(Table):
         """Put the state at the end of a run in the place of its file; yield a problem if it cannot be used."""
         if (path := getattr(self.initial, "from")) is None:
             return
+        from brakecli.case.restart import initial_at, last_of
+
         try:
             end = last_of(Path(path), type(self).model_validate)
             state = initial_at(end.case.wheel, end.case.initial.wheel_angle, end.time, end.state)

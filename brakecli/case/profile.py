@@ -2,17 +2,16 @@
 
 import hashlib
 import math
-from contextvars import ContextVar
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
+from brakecli.case.records import MOST_MEASURED, Record, arrays
 from brakecli.case.tables import MOST_SINES
 from brakecli.errors import UsageError, printable
 from brakecli.results.table import Array, TextTable, require
 
-MOST_MEASURED = 2.5e8  # bytes of all measured profiles of a case or sweep, which travel to every worker
 _ROUNDING = 1e-12  # of heights, relative to their root mean square
 _GAP = 4.0  # median steps between two places from which on nothing was measured there
 _FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
@@ -23,17 +22,6 @@ _FARTHEST = 1e9
 _FLATTEST = 1e-15
 _MOST_PLACES = 10  # of the even grid for each that was measured
 _FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
-
-
-class Record(NamedTuple):
-    """A measured profile: rising places (m, or rad if `is_angle`) and heights (m), each as bytes of float64."""
-
-    place: bytes
-    height: bytes
-    is_angle: bool
-
-
-arrays = ContextVar[dict[str, Record]]("measured profiles that come from no file, by their names")
 
 
 def sines_of(name: str, record: Record, error: float, radius: float, pad: float | None) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from pydantic import ValidationError
 
 from brakecli.case import wording
 from brakecli.case.case import Case, changed, resolved_toml
-from brakecli.case.profile import Record, arrays
+from brakecli.case.records import Record, arrays
 from brakecli.case.roughness import Records, reading
 from brakecli.case.tables import MISSING, OverCase, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 from pydantic import Field
 
 from brakecli.case import tables
-from brakecli.case.profile import MOST_MEASURED, Record, read
+from brakecli.case.records import MOST_MEASURED, Record
 from brakecli.case.tables import MOST_SINES, SMALLEST, NonNegative, Positive, Table, Weight, described, quantity
 from brakecli.errors import Problem, UsageError
 
@@ -36,6 +36,8 @@ class Records(dict[str, Record]):
 
     def __missing__(self, path: str) -> Record:
         """Read a profile, which other names of its file then have in common."""
+        from brakecli.case.profile import read
+
         file = os.path.realpath(path)
         self[path] = self._files[file] = found = self._files.get(file) or read(Path(file))
         if sum(2 * len(each.place) for each in {*self.values()}) > MOST_MEASURED:

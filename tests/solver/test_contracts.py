@@ -28,11 +28,13 @@ from tests.solver import small_scheme
 from tests.solver.rough_gap import outputs, unfilled
 
 EVALUATORS = sorted(
-    module.name for module in pkgutil.iter_modules(contact.__path__) if module.name not in ("pad", "force")
+    module.name
+    for module in pkgutil.iter_modules(contact.__path__)
+    if module.name not in ("pad", "force", "heights")
 )
 SCHEMES = sorted(
     module.name
-    for module in pkgutil.iter_modules([*schemes.__path__, *steps.__path__])
+    for module in pkgutil.iter_modules(steps.__path__)
     if module.name not in ("loop", "step", "implicit")
 )
 STEPPING = [name.replace("-", "_") for name, row in schemes.SCHEMES.items() if not row.own_steps]

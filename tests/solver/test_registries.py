@@ -22,7 +22,7 @@ ROWS = {
         '    "exact": Evaluator(',
         '    "spring": Evaluator("brakecli.solver.contact.spring"),\n',
     ),
-    "solver/schemes/__init__.py": (
+    "solver/schemes.py": (
         '    "event-driven": Scheme(',
         '    "backward-euler": Scheme("brakecli.solver.steps.backward_euler", (Trial(),),'
         ' unstable="or take another scheme"),\n',

@@ -19,8 +19,6 @@ The rows are plain data; a file is imported when it is used. An evaluator keeps 
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
-from brakecli.solver.records import MOST_KINDS
-
 if TYPE_CHECKING:
     from brakecli.solver.arrays import Floats
     from brakecli.solver.records import Layer
@@ -76,6 +74,8 @@ def place_of(name: str) -> int:
 
     Raises ValueError where there are more kinds than a run can count.
     """
+    from brakecli.solver.records import MOST_KINDS
+
     if len(kinds()) > MOST_KINDS:
         raise ValueError(f"EVALUATORS has {len(kinds())} kinds, a run can count {MOST_KINDS}; increase MOST_KINDS")
     return list(EVALUATORS).index(name)

@@ -15,8 +15,8 @@ from pydantic import ValidationError
 
 from brakecli.case import wording
 from brakecli.case.case import Case, given_toml
-from brakecli.case.profile import Record
 from brakecli.case.read import LoadedCase, key_path, parse_over_case, parse_table, put
+from brakecli.case.records import Record
 from brakecli.case.roughness import Records, reading
 from brakecli.case.tables import Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem

@@ -16,7 +16,7 @@ import pytest
 from brakecli.about import __version__
 from brakecli.api.inputs import load_sweep
 from brakecli.case import profile
-from brakecli.case.profile import Record
+from brakecli.case.records import Record
 from brakecli.errors import BrakecliError, CannotWriteError, RefusedError
 from brakecli.solver.cache_folder import source_hash
 from brakecli.studies.sweeps.driver import sweep
