@@ -95,3 +95,29 @@ def test_self_locking_of_a_rough_shoe_is_a_change_for_all() -> None:
     (change,) = sliding.changes(sliding.along())
     assert (change.kind, change.lost) == ("divergence", True)
     assert 3.0 * change.p == pytest.approx(told.friction, rel=DIGITS)
+
+
+ON_THE_EQUILIBRIUM = """
+shoe.mass = 1.7
+wheel = { radius = 0.2, angular_speed = 1.4 }
+link1 = { stiffness = 2.3e6, damping = 29.0, angle_deg = 3.8 }
+link2 = { stiffness = 6.7e6, damping = 33.0, angle_deg = 5.1 }
+load.force = 1500.0
+friction.coefficient = 0.4
+contact = { half_length = 0.03, stiffness = 5.0e7 }
+solver = { tolerance = 1e-5, duration = "settled" }
+initial.at = "equilibrium"
+"""
+
+
+@pytest.mark.filterwarnings("ignore::UserWarning")  # what grows out of rounding has no certified error
+def test_a_start_on_unstable_sliding_itself_is_judged_alike_by_runs_and_sweeps(tmp_path: Path) -> None:
+    """Only rounding moves such a shoe, or nothing does: neither ends in a division by zero."""
+    file = tmp_path / "on.toml"
+    file.write_text(ON_THE_EQUILIBRIUM)
+    values = [0.71, 0.5900000000000001]
+    found = brakecli.sweep(file, axes={"friction.coefficient": values}, jobs=1)
+    for value, regime in zip(values, found.regime.values.tolist(), strict=True):
+        run = brakecli.run(file, {"friction.coefficient": value}, progress=False)
+        assert regime == run.attrs["regime"]
+    assert found.regime.values.tolist()[0] == "undecided"

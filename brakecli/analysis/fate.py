@@ -114,11 +114,13 @@ def fate_on_smooth_pads(
     if modes is None:
         values, shapes = eigensystem(c, stiffness, c.grip(belt))
         modes = values, np.concatenate([shapes, shapes * values])
+    rate = float(modes[0].real.max())
+    if tuple(state) == (*shoe.rest, 0.0, 0.0):  # only rounding would move it
+        return Fate(Kind.UNKNOWN if rate > 0.0 else Kind.STEADY_SLIDING)
     try:
         motion = Pursuit(c, (stiffness, belt, load), state, np.array(shoe.rest), modes, until or FOREVER)
     except np.linalg.LinAlgError:  # modes that are alike
         return Fate(Kind.UNKNOWN)
-    rate = float(modes[0].real.max())
     while motion.steps < MOST_STEPS and motion.time < within and not signalled():
         if rate > 0.0 and until is None:  # a disturbance grows slowly
             motion.way.duration = motion.time + max(NEARS / rate, AHEAD * motion.path.h)

@@ -73,7 +73,9 @@ def _by_phases(system: System, progress: Progress) -> Certified:
     run = _solved(system, progress)
     longest = SHORTER * system.longest_step
     largest, carried = run.work.rounding or (np.zeros(4), np.zeros(4))
-    error = max(ROUNDED_MARGIN * float((carried / sizes(system, largest, largest)).max()), ROUNDING)
+    size = sizes(system, largest, largest)
+    relative = np.divide(carried, size, out=np.zeros(4), where=np.isfinite(size))  # what rests has no error
+    error = max(ROUNDED_MARGIN * float(relative.max()), ROUNDING)
     if error <= wanted and not run.work.failed:
         how = f"the rounding of piecewise-exact steps of {run.system.step:.3g} s"
         return Certified(run, Certificate(wanted, True, error, system.sampled_duration, how))
