@@ -18,6 +18,7 @@ from brakecli.studies.sweeps.critical import search
 from brakecli.studies.sweeps.tables import Critical
 from tests.analysis.shoes import random_shoes
 from tests.campaign import counts
+from tests.commands import brakecli as command
 from tests.examples import make
 
 DIGITS = 5e-7
@@ -121,3 +122,15 @@ def test_a_start_on_unstable_sliding_itself_is_judged_alike_by_runs_and_sweeps(t
         run = brakecli.run(file, {"friction.coefficient": value}, progress=False)
         assert regime == run.attrs["regime"]
     assert found.regime.values.tolist()[0] == "undecided"
+
+
+def test_a_search_tells_of_vibration_beside_stable_sliding_as_stability_does(tmp_path: Path) -> None:
+    file = tmp_path / "on.toml"
+    file.write_text(ON_THE_EQUILIBRIUM)
+    (tmp_path / "s.toml").write_text(
+        'case = "on.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0\nupper = 1\n'
+        '[[axis]]\nparameter = "link2.angle_deg"\nvalues = [5.0, 6.0]\n'
+    )
+    least = min(float(brakecli.stability(file, {"link2.angle_deg": angle}).coexists_from) for angle in (5.0, 6.0))
+    said = command("sweep", "s.toml", "-j", "1", cwd=tmp_path).out
+    assert f"can exist at 2 of 2 points, the least value is {least:.4g}" in " ".join(said.split())

@@ -83,7 +83,23 @@ def _answer(report: SweepReport, show: Renderer) -> list[str]:
         span = f", from {show.text(least)}{_where(report, least)} to {show.text(largest)}{_where(report, largest)}"
     elif count:
         span = f": {show.text(least)}{_where(report, least)}"
-    return [f"a critical {sought.parameter} is found at {count} of {found.points} points{span}"]
+    return [
+        f"a critical {sought.parameter} is found at {count} of {found.points} points{span}",
+        *_beside(report, show),
+    ]
+
+
+def _beside(report: SweepReport, show: Renderer) -> list[str]:
+    """Where a vibration can exist beside stable sliding, by a search at several points."""
+    variables = report.findings.variables
+    if variables is None:
+        return []
+    values = np.ravel(np.array(variables["coexists_from"], float))
+    values = values[np.isfinite(values)]
+    if not values.size:
+        return []
+    where = f"at {values.size} of {report.findings.points} points, the least value is {show.text(values.min())}"
+    return [f"beside stable sliding a vibration can exist {where}"]
 
 
 def _where(report: SweepReport, critical: float) -> str:
