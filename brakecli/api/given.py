@@ -18,8 +18,8 @@ if TYPE_CHECKING:
     from brakecli.api.records import Changes, Keys, Source, Sweep
     from brakecli.case.read import LoadedCase
     from brakecli.studies.scattering.study import LoadedStudy
-    from brakecli.studies.sweeps.listed import Listed
     from brakecli.studies.sweeps.plan import LoadedSweep
+    from brakecli.studies.sweeps.point_list import Listed
     from brakecli.studies.sweeps.tables import Axis
 
 MOST_VALUES = 10_000
@@ -182,8 +182,8 @@ def text_of(given: Any, name: str) -> str:
 def sweep_of_options(options: "Sweep") -> "LoadedSweep":
     """The sweep of a file, of what was loaded, or of axes, points and a search in Python."""
     from brakecli.api.inputs import load_sweep
-    from brakecli.studies.sweeps.listed import GIVEN
     from brakecli.studies.sweeps.plan import LoadedSweep, sweep_of
+    from brakecli.studies.sweeps.point_list import GIVEN
 
     if options.axes is not None or options.points is not None or options.critical is not None:
         listed = points_of(options.points)
@@ -208,7 +208,7 @@ def sweep_of_options(options: "Sweep") -> "LoadedSweep":
 def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
     """Points that are given by columns; a data frame has them as well."""
     from brakecli.case.read import key_path
-    from brakecli.studies.sweeps.listed import Listed, refuse_many
+    from brakecli.studies.sweeps.point_list import Listed, refuse_many
 
     if points is None:
         return None

@@ -17,7 +17,7 @@ from brakecli.solver.history import History, array_history
 from brakecli.solver.motion.flow import Orbit
 from brakecli.solver.quantities import HISTORY, ContactState
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, Events, Track
-from brakecli.studies.runs.judge import asked, judged_in_memory
+from brakecli.studies.runs.judge import judged_in_memory, to_judge
 
 INTERVAL = 1e-4
 MARKS = 512
@@ -34,7 +34,7 @@ def history_of(samples: int, **columns: Any) -> History:
 
 def verdict_of(case: Any) -> Verdict:
     """The verdict on the run of a case."""
-    return judged_in_memory(asked(system_of(case)), lambda steps: None).verdict
+    return judged_in_memory(to_judge(system_of(case)), lambda steps: None).verdict
 
 
 def events_from_samples(time: Array, x: Array, vx: Array, state: Array) -> Events:

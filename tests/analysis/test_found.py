@@ -34,7 +34,7 @@ def judged_to_its_tolerance(name: str, times: float = 1.0) -> Verdict:
     """The same of a shoe whose case gives a tolerance in place of a step."""
     tables = SHOES[name]
     case = make(tables, solver__duration=times * tables["solver"]["duration"])
-    return judge.judged_in_memory(judge.asked(system_of(case)), lambda steps: None).verdict
+    return judge.judged_in_memory(judge.to_judge(system_of(case)), lambda steps: None).verdict
 
 
 def test_a_shoe_that_locks_itself_is_not_called_forced_while_it_drifts_away() -> None:
@@ -370,7 +370,7 @@ def test_a_motion_that_can_neither_stick_nor_open_any_more_is_linear_before_its_
 ASKED = re.compile(r"run at least ([\d.e+-]+) s( longer)?")
 
 
-def asked(verdict: Verdict, duration: float) -> float | None:
+def to_judge(verdict: Verdict, duration: float) -> float | None:
     """The duration (s) that an undecided verdict asks for."""
     found = ASKED.search(verdict.reasons[0]) if verdict.regime is Regime.UNDECIDED else None
     return float(found[1]) + (duration if found[2] else 0.0) if found else None
@@ -454,7 +454,7 @@ def test_the_time_that_a_verdict_asks_for_is_enough_or_the_new_one_has_another_r
         if duration > 2e4 * tables["solver"]["step"]:
             continue
         first = verdict_of(make(tables))
-        needed = asked(first, duration)
+        needed = to_judge(first, duration)
         if needed is None or needed > 5.0 * duration:
             continue
         again = verdict_of(make(tables, solver__duration=needed))

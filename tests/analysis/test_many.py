@@ -13,7 +13,7 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
 from brakecli.solver.history import stacked
 from brakecli.solver.integrate import solve
-from brakecli.studies.runs.judge import asked, in_memory
+from brakecli.studies.runs.judge import in_memory, to_judge
 from tests.analysis.histories import history_of
 from tests.examples import ROUGH, SQUEAL, make
 
@@ -32,7 +32,7 @@ def motions() -> list[Given]:
     rough += [make(ROUGH, **COARSE, load__force=each) for each in (300.0, 600.0)]
     rough += [make(LOADED, **COARSE, **DAMPED, solver__duration=each) for each in (0.005, 0.2)]
     smooth = [make(SQUEAL, friction__coefficient=each) for each in (0.0, 0.3, 0.6, 0.9)]
-    systems = [asked(system_of(case)) for case in (*rough, *smooth)]
+    systems = [to_judge(system_of(case)) for case in (*rough, *smooth)]
     return [in_memory(solve(each), each) for each in systems]
 
 

@@ -16,7 +16,7 @@ from brakecli.case.read import parse_case
 from brakecli.case.system import system_of
 from brakecli.solver.history import array_history
 from brakecli.solver.quantities import ContactState
-from brakecli.studies.runs.judge import given
+from brakecli.studies.runs.judge import inputs_of
 from tests.analysis.found import SHOES
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
 from tests.campaign import counts
@@ -307,7 +307,7 @@ def test_a_stop_is_not_called_settled() -> None:
 def test_a_failed_run_is_neither_forced_nor_settled() -> None:
     case = make(DRUM, solver__duration=2.0)
     motion = array_history(1e-4, simulate(case).rows)
-    (verdict,) = classify([given(motion, system_of(case), "it broke")])
+    (verdict,) = classify([inputs_of(motion, system_of(case), "it broke")])
     assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.UNDECIDED, Excitation.NONE, False)
     assert verdict.growth_rate is None
 

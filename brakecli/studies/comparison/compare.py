@@ -72,7 +72,7 @@ class Entry:
     label: str  # the method in a few words
     kind: Method  # without step and tolerance
     method: Method
-    place: int  # on the ladder of steps or tolerances, from the coarsest on
+    rung: int  # on the ladder of steps or tolerances, from the coarsest on
     errors: Errors | None = None
     work: Work | None = None
     failure: str = ""
@@ -134,16 +134,16 @@ def compare(
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
     with within_range():
-        found = ladder(system, steps)
+        lengths = ladder(system, steps)
         entries = list[Entry]()
         for kind in kinds(system, schemes):  # compilation is not part of the budget
             load(kind.scheme)
             label = method_label(kind)
-            entries += [Entry(label, kind, each, place) for place, each in enumerate(rungs(kind, found))]
+            entries += [Entry(label, kind, method, rung) for rung, method in enumerate(rungs(kind, lengths))]
         begin = time.perf_counter()
         report = linear.stability(system)
         progress("reference", 0, 0)
-        sampled = replace(system, interval=found[0])
+        sampled = replace(system, interval=lengths[0])
         reference = _reference(sampled, REFERENCE_SHARE * budget)
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
         checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
@@ -177,24 +177,24 @@ def _event_driven(system: System, tolerance: float, without: str) -> Motion:
 def _reference(system: System, budget: float) -> Motion:
     """The longest part of the motion whose reference fits the budget (s), from the start on."""
     shortest = FEWEST_SAMPLES * system.interval
-    part = replace(system, duration=shortest)
+    piece = replace(system, duration=shortest)
     whole = max(system.duration, shortest)
     while True:
-        motion = _event_driven(part, REFERENCE, "there is no reference to compare with")
+        motion = _event_driven(piece, REFERENCE, "there is no reference to compare with")
         seconds = motion.work.solve_seconds
-        if part.duration >= whole or LONGER * seconds > budget:
+        if piece.duration >= whole or LONGER * seconds > budget:
             return motion
-        longer = part.duration * min(MOST_LONGER, AIM * budget / max(seconds, 1e-3))
-        part = replace(part, duration=min(longer, whole))
+        longer = piece.duration * min(MOST_LONGER, AIM * budget / max(seconds, 1e-3))
+        piece = replace(piece, duration=min(longer, whole))
 
 
 def _measure(system: System, entries: list[Entry], reference: Floats, deadline: float, progress: Counted) -> None:
     """Run every rung once, the coarse ones first, while there is time, and measure its error."""
     last: dict[Method, float] = {}
-    for done, entry in enumerate(sorted(entries, key=lambda each: each.place)):
+    for done, entry in enumerate(sorted(entries, key=lambda entry: entry.rung)):
         progress("errors", done, len(entries))
         # The coarsest of each method is run in any case
-        if entry.place and time.perf_counter() + 2.0 * last.get(entry.kind, 0.0) > deadline:
+        if entry.rung and time.perf_counter() + 2.0 * last.get(entry.kind, 0.0) > deadline:
             entry.failure = LEFT_OUT
             continue
         try:
@@ -239,8 +239,8 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
     @cache
     def bias(scheme: Method, step: float) -> float | None:
         at = replace(system, interval=step, duration=step, method=replace(scheme, step=step))
-        found = linear.discrete_critical(at, stiffness_at, exact) if exact else None
-        return found - exact.friction if found is not None and exact else None
+        critical = linear.discrete_critical(at, stiffness_at, exact) if exact else None
+        return critical - exact.friction if critical is not None and exact else None
 
     for entry in entries:
         scheme = Method(entry.kind.scheme, entry.kind.theta)
@@ -249,20 +249,20 @@ def _add_limits(system: System, report: linear.StabilityReport, entries: list[En
             entry.step_limit = math.inf
             entry.critical_bias = 0.0 if exact else None
         elif report.discrete is not None:  # otherwise no steady sliding could lose its stability
-            found = limit(scheme)
-            entry.step_limit = math.inf if found is None else found
+            longest = limit(scheme)
+            entry.step_limit = math.inf if longest is None else longest
             entry.critical_bias = bias(scheme, step)
     for coarse, fine in pairwise(entries):
         long = coarse.method.step
         short = fine.method.step
-        if fine.place and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
+        if fine.rung and long and short and 0.0 < fine.error < math.inf and 0.0 < coarse.error < math.inf:
             fine.order = math.log(coarse.error / fine.error) / math.log(long / short)
 
 
 def _mark_front(entries: list[Entry]) -> None:
     """Mark the entries that no other beats in both error and time."""
     best = math.inf
-    for entry in sorted(entries, key=lambda each: (each.wall_seconds or 0.0, each.error)):
+    for entry in sorted(entries, key=lambda entry: (entry.wall_seconds or 0.0, entry.error)):
         if entry.error < best:
             entry.on_front = True
             best = entry.error
@@ -302,5 +302,5 @@ def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None
         return None, None
     turning = np.exp(-2j * math.pi * top / count * np.arange(count)) * window
     exact = complex(turning @ late)
-    found = complex(turning @ (values[-count:] - values[-count:].mean()))
-    return abs(found) / abs(exact) - 1.0, float(np.angle(found / exact))
+    computed = complex(turning @ (values[-count:] - values[-count:].mean()))
+    return abs(computed) / abs(exact) - 1.0, float(np.angle(computed / exact))

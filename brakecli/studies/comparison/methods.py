@@ -57,7 +57,7 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
     usual = "closed-form" if system.smooth else "auto"
     plain = system.by(evaluator="midpoint")
     counts = sorted({plain.by(nodes=round(plain.nodes * factor)).nodes for factor in NODE_FACTORS})
-    found = []
+    methods = []
     for name, scheme in SCHEMES.items():
         if scheme.exact and not system.smooth:
             continue
@@ -65,12 +65,12 @@ def kinds(system: System, wanted: Sequence[str] = ()) -> list[Method]:
             if moving and trial.start == "paper":
                 continue
             kind = Method(name, trial.theta, trial.start, trial.iteration)
-            found.append(kind if scheme.own_steps else replace(kind, evaluator=usual, nodes=system.nodes))
+            methods.append(kind if scheme.own_steps else replace(kind, evaluator=usual, nodes=system.nodes))
             if trial.contacts and not system.smooth:
                 on_nodes = "cells" if scheme.own_steps else "midpoint"
-                found += [replace(kind, evaluator=on_nodes, nodes=count) for count in counts]
-                found += [] if scheme.own_steps else [replace(kind, evaluator="exact")]
-    return sorted(found, key=lambda kind: (kind.own_steps, kind.evaluator != usual))
+                methods += [replace(kind, evaluator=on_nodes, nodes=count) for count in counts]
+                methods += [] if scheme.own_steps else [replace(kind, evaluator="exact")]
+    return sorted(methods, key=lambda kind: (kind.own_steps, kind.evaluator != usual))
 
 
 def ladder(system: System, steps: Sequence[float] = ()) -> list[float]:
@@ -106,7 +106,7 @@ def parse_steps(text: str | None) -> list[float]:
     if text is None:
         return []
     try:
-        steps = [float(part) for part in text.split(",")]
+        steps = [float(number) for number in text.split(",")]
     except ValueError:
         steps = []
     if not steps or not all(SMALLEST < step < LARGEST for step in steps):

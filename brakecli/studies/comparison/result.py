@@ -34,9 +34,9 @@ class ComparisonReport:
     @property
     def recommended(self) -> Entry | None:
         """The entry that takes the least time of those that meet the target, the reference's error added."""
-        timed = [each for each in self.comparison.entries if each.seconds]
+        timed = [entry for entry in self.comparison.entries if entry.seconds]
         added = self.comparison.reference_error
-        able = [each for each in timed if each.error + added <= self.target]
+        able = [entry for entry in timed if entry.error + added <= self.target]
         return min(able, key=lambda entry: entry.wall_seconds or math.inf, default=None)
 
     @property
@@ -61,13 +61,13 @@ def write(path: Path, loaded: LoadedCase, report: ComparisonReport, *, force: bo
     """Write the result file; raises UsageError or CannotWriteError."""
     numbers = report.numbers()
     entries = report.comparison.entries
-    place = next((place for place, entry in enumerate(entries) if entry is report.recommended), None)
+    index = next((index for index, entry in enumerate(entries) if entry is report.recommended), None)
     with new_result(path, force=force) as result:
         result.set_attributes(origin("comparison", report.title, loaded))
-        result.set_fields(fields.COMPARISON, {**numbers, "recommended": place})
+        result.set_fields(fields.COMPARISON, {**numbers, "recommended": index})
         result.axis("/", fields.ENTRY_PLACE, np.arange(len(entries)))
         for field in fields.ENTRY:
-            values = [each[field.name] for each in numbers["entries"]]
+            values = [entry[field.name] for entry in numbers["entries"]]
             if field.name == "theta":
                 values = [", ".join(f"{weight:.6g}" for weight in theta) for theta in values]
             result.column(field, ("entry",), values)

@@ -21,8 +21,8 @@ from brakecli.results import stability_fields as fields
 from brakecli.results.field import values_of
 from brakecli.solver.integrate import Counted, Motion
 from brakecli.solver.system import System
-from brakecli.studies.runs.judge import asked, judged_in_memory
-from brakecli.studies.runs.settled import Judged, settled
+from brakecli.studies.runs.judge import judged_in_memory, to_judge
+from brakecli.studies.runs.settled import Judged, settle
 from brakecli.studies.runs.work import stability_work, table_work, work_of
 
 # of a run that checks, which is cut short beyond
@@ -92,22 +92,22 @@ class AdviceReport:
 
     def notes(self) -> list[str]:
         """What the answer rests on."""
-        rest = self.stability.equilibrium
+        equilibrium = self.stability.equilibrium
         load = abs(self.system.load_at_start)
-        found = []
-        if rest is not None and rest.normal_force < _PRESSED_PART * load:
-            pressed = f"{float(f'{rest.normal_force:.3g}'):g} N press the shoe on"
-            found.append(f"of the load of {load:g} N, {pressed}; the links carry the rest")
-        if rest is not None and 0.0 < rest.contact_fraction < 1.0:
+        sentences = []
+        if equilibrium is not None and equilibrium.normal_force < _PRESSED_PART * load:
+            pressed = f"{float(f'{equilibrium.normal_force:.3g}'):g} N press the shoe on"
+            sentences.append(f"of the load of {load:g} N, {pressed}; the links carry the rest")
+        if equilibrium is not None and 0.0 < equilibrium.contact_fraction < 1.0:
             instead = 'a sweep with method = "simulation" follows the motion itself'
-            found.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
+            sentences.append(f"the pad opens in part: this rests on the mean stiffness of the contact; {instead}")
         if is_undamped(self.system.coefficients):
-            found.append("no dashpot acts: where sliding is stable, vibration does not die away either")
+            sentences.append("no dashpot acts: where sliding is stable, vibration does not die away either")
         if not self.system.steady:
-            found.append("speed and load are those of t = 0")
+            sentences.append("speed and load are those of t = 0")
         if self.left_out:
-            found.append(self.left_out)
-        return found
+            sentences.append(self.left_out)
+        return sentences
 
     def _state(self) -> Iterator[str]:
         report = self.stability
@@ -133,14 +133,14 @@ class AdviceReport:
             lost = f"sliding loses its stability{at} from a friction coefficient of {critical:.3g} on"
             yield f"{lost}{_far(self.margin, own)}"
             if report.stable and critical < own:
-                changes = (("lost" if each.lost else "regained", each.friction) for each in report.crossings)
+                changes = (("lost" if zero.lost else "regained", zero.friction) for zero in report.crossings)
                 turns = ", ".join(f"{change} at {friction:.3g}" for change, friction in changes)
                 yield f"the case lies above a range of instability, as stability is {turns}"
             if self.thresholds.beside:
                 yield self.thresholds.beside
             if self.squeal:
-                part = 100.0 * self.squeal.squeal_probability
-                yield f"under a scatter {self.scatter} {part:.2g} % of such brakes squeal"
+                percent = 100.0 * self.squeal.squeal_probability
+                yield f"under a scatter {self.scatter} {percent:.2g} % of such brakes squeal"
         elif report.equilibrium is not None and report.contact_stiffness > 0.0:
             searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
             yield f"stable: no friction makes it unstable{searched}"
@@ -156,8 +156,8 @@ class AdviceReport:
         effect = "takes the instability away"
         if critical is not None:
             effect = f"moves the loss of stability to {critical:.3g}"
-        left = "" if best.squeal is None else f", and {100.0 * best.squeal.squeal_probability:.2g} % squeal"
-        yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}{left}"
+        squealing = "" if best.squeal is None else f", and {100.0 * best.squeal.squeal_probability:.2g} % squeal"
+        yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}{squealing}"
         if best.check is None:
             yield "no run has checked that"
         elif best.check == Regime.UNDECIDED:
@@ -172,9 +172,9 @@ def _far(margin: float | None, own: float) -> str:
         return ""
     if margin > _TIMES:
         return f", {margin + 1.0:.3g} times the case's {own:g}"
-    part = 100.0 * abs(margin)
+    percent = 100.0 * abs(margin)
     where = "above" if margin > 0.0 else "below"
-    return f", {part:{'.0f' if part > 99.0 else '.2g'}} % {where} the case's {own:g}"
+    return f", {percent:{'.0f' if percent > 99.0 else '.2g'}} % {where} the case's {own:g}"
 
 
 def _work(loaded: LoadedCase) -> float:
@@ -197,21 +197,21 @@ def advise(
     everything = of_case.numbers(case)
     system = system_of(case)
     report = stability(system)
-    found = of_case.answer(case)
-    critical = found.critical if found else None
+    answer = of_case.answer(case)
+    critical = answer.critical if answer else None
     sensitivities = list[Sensitivity]()
     left_out = ""
     if _work(loaded) > most:
         left_out = "what to change is left out, as it takes long here: `brakecli advise` asks it"
     else:
-        for done, path in enumerate(everything if found else ()):
-            tell = partial(progress, "derivatives", done, len(everything))
-            sensitivities.append(of_case.sensitivity(case, path, critical, tell))
-        slides = found is not None or (system.smooth and system.belt_speed != 0.0)
-        if slides and not (found and found.safe((1.0 + margin) * report.friction)):
+        for done, path in enumerate(everything if answer else ()):
+            counted = partial(progress, "derivatives", done, len(everything))
+            sensitivities.append(of_case.sensitivity(case, path, critical, counted))
+        slides = answer is not None or (system.smooth and system.belt_speed != 0.0)
+        if slides and not (answer and answer.safe((1.0 + margin) * report.friction)):
             for done, path in enumerate(keys):
                 advice.append(of_case.advised(case, path, margin, partial(progress, "keys", done, len(keys))))
-    sensitivities.sort(key=lambda each: -abs(each.elasticity or 0.0))
+    sensitivities.sort(key=lambda sensitivity: -abs(sensitivity.elasticity or 0.0))
     advice, checks = _ranked(case, advice, progress)
     both = thresholds(case, system, report, progress)
     return AdviceReport(
@@ -226,11 +226,11 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
     """
     checks = dict[str, CheckRun]()
     spent = 0.0
-    for each in sorted(advice, key=lambda each: each.size):
-        if each.to is None or spent > _ALL_CHECKS_WORK or (part := _to_check(case, each)) is None:
+    for change in sorted(advice, key=lambda change: change.size):
+        if change.to is None or spent > _ALL_CHECKS_WORK or (trial := _to_check(case, change)) is None:
             continue
-        system, work = part
-        checks[each.parameter] = _checked(system, each, progress)
+        system, work = trial
+        checks[change.parameter] = _checked(system, change, progress)
         spent = spent + work
     regimes = {key: str(check.verdict.regime) for key, check in checks.items()}
     places: dict[str | None, int] = {Regime.DAMPED: 0, Regime.UNDECIDED: 1, None: 1}
@@ -238,7 +238,7 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
     def rank(change: Change) -> tuple[bool, int, float]:
         return change.to is None, places.get(change.check, 2), change.size
 
-    return sorted((replace(each, check=regimes.get(each.parameter)) for each in advice), key=rank), checks
+    return sorted((replace(change, check=regimes.get(change.parameter)) for change in advice), key=rank), checks
 
 
 def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
@@ -250,23 +250,23 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
     if there is None:
         return None
     system = system_of(there)
-    found = of_case.answer(there, 0.0)
+    answer = of_case.answer(there, 0.0)
     work = work_of(system).amount
-    decays = -found.growth if found and found.growth and system.steady else 0.0
+    decays = -answer.growth if answer and answer.growth and system.steady else 0.0
     long = min(_DECAYED / (decays * system.duration), _DECAYED_SAMPLES / system.samples) if decays > 0.0 else 1.0
-    part = min(max(long, 1.0), CHECK_WORK / max(work, 1e-9), _CHECK_SAMPLES / system.samples)
-    return replace(system, duration=part * system.duration), part * work
+    factor = min(max(long, 1.0), CHECK_WORK / max(work, 1e-9), _CHECK_SAMPLES / system.samples)
+    return replace(system, duration=factor * system.duration), factor * work
 
 
 def _checked(system: System, change: Change, progress: Counted) -> CheckRun:
     """Run a system with an advised value."""
     start = time.perf_counter()
 
-    def run(part: System) -> Judged[Motion]:
-        what, total = ("samples", part.samples) if part.method.step is None else ("steps", part.steps)
-        return judged_in_memory(part, lambda done: progress(f"{what} of the check", done, total))
+    def run(trial: System) -> Judged[Motion]:
+        what, total = ("samples", trial.samples) if trial.method.step is None else ("steps", trial.steps)
+        return judged_in_memory(trial, lambda done: progress(f"{what} of the check", done, total))
 
-    ended = settled(asked(system), run)
+    ended = settle(to_judge(system), run)
     spent = time.perf_counter() - start
     duration = ended.system.sampled_duration
     return CheckRun(change.parameter, float(change.rounded), ended.judged.verdict, duration, spent)

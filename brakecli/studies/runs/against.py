@@ -84,16 +84,16 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
     run.
     """
     wanted = system.method.tolerance
-    exact, known = reference
-    until = known.certified_until
-    off = known.estimated_error if known.certified else PART * wanted
+    exact, promise = reference
+    until = promise.certified_until
+    off = promise.estimated_error if promise.certified else PART * wanted
     rung, spent = _with_nodes(system, reference, run)
     seconds = sum(work.solve_seconds for work in spent)
     steps = sum(work.all_steps for work in spent)
     step = first_step(system)
     before = None
     counted = 0.0
-    for left in range(MOST_RUNS - 1, -1, -1):
+    for remaining in range(MOST_RUNS - 1, -1, -1):
         motion = run(rung.by(step=step))
         work = motion.work
         seconds += work.solve_seconds
@@ -101,8 +101,8 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
         counted += last
         apart = compare(motion, exact)
         error = apart.error_until(until) + off
-        kept = not work.failed and error <= wanted
-        if kept or not left or until == 0.0:
+        within = not work.failed and error <= wanted
+        if within or not remaining or until == 0.0:
             break
         tried = None if work.failed else _Tried(motion.system.step, error)
         step = motion.system.step / (_finer(motion.system, before, tried) if tried else FAILED)
@@ -112,12 +112,12 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
         steps += work.steps
     work.solve_seconds = seconds
     work.coarser_steps = steps
-    certified = kept and known.certified
+    certified = within and promise.certified
     if not certified:
-        whole = apart.error + known.estimated_error
+        whole = apart.error + promise.estimated_error
         error = NOTHING if work.failed or exact.work.failed else max(whole, wanted * MISSED)
     with_nodes = f" and {motion.system.nodes} nodes" if motion.system.nodes else ""
-    known_until = "" if known.certified else f", known up to {until:.4g} s"
+    known_until = "" if promise.certified else f", known up to {until:.4g} s"
     own = f"held against {exact.system.method.scheme} ones{known_until}"
     certificate = Certificate(
         tolerance=wanted,
@@ -148,20 +148,20 @@ def _with_nodes(
     What nodes make of the error is known from the reference or, where its contact is exact, from one more run.
     Where so many are needed that the exact contact is cheaper, the scheme takes that.
     """
-    seen = reference.motion
-    spent: tuple[Work, ...] = (seen.work,)
+    motion = reference.motion
+    spent: tuple[Work, ...] = (motion.work,)
     nodes = first_nodes(system)
-    if not nodes or set(seen.work.evaluators) == {"closed-form"}:
+    if not nodes or set(motion.work.evaluators) == {"closed-form"}:
         return system.by(nodes=nodes), spent
     wanted = system.method.tolerance
-    if not seen.system.nodes:
+    if not motion.system.nodes:
         on_nodes = reference_of(system).by(evaluator="cells", nodes=2 * nodes, tolerance=FIRST * wanted)
-        seen = run(replace(on_nodes, start_error=displacement(system)))
-        spent = (*spent, seen.work)
-    part = reference.certificate.certified_until / system.sampled_duration
-    error = SAFETY * Known.of_run(seen).by_nodes(part)
+        motion = run(replace(on_nodes, start_error=displacement(system)))
+        spent = (*spent, motion.work)
+    fraction = reference.certificate.certified_until / system.sampled_duration
+    error = SAFETY * Known.of_run(motion).by_nodes(fraction)
     more = min((error / (AIM_OF_NODES * wanted)) ** (1.0 / ORDER_OF_NODES), MOST_NODES)
-    nodes = max(nodes, NODES * math.ceil(more * seen.system.nodes / NODES))
+    nodes = max(nodes, NODES * math.ceil(more * motion.system.nodes / NODES))
     on_nodes = system.by(nodes=nodes)
     exact = system.by(evaluator="exact")
     dear = evaluation_work(on_nodes) > evaluation_work(exact) or on_nodes.table_bytes > MOST_TABLE_BYTES

@@ -56,7 +56,7 @@ def parsed(text: str) -> tuple[tuple[str, ...], float, float]:
     keys, _, numbers = text.partition("=")
     names = tuple(keys.split(","))
     with suppress(ValueError):
-        low, high = (float(each) for each in numbers.split(":"))
+        low, high = (float(number) for number in numbers.split(":"))
         paths = [key_path(name) for name in names]
         if (
             math.isfinite(low)
@@ -102,37 +102,37 @@ def branch(
     return Answers(explorer.explore(states, switch, pushes), explorer.line.own)
 
 
-def write(path: Path, loaded: LoadedCase, found: Answers, units: str, *, force: bool) -> None:
+def write(path: Path, loaded: LoadedCase, answers: Answers, units: str, *, force: bool) -> None:
     """Write all branches, each as a group; raises UsageError or CannotWriteError."""
     with new_result(path, force=force) as result:
         result.set_attributes(origin("branch", loaded.case.title, loaded))
-        result.set_fields(fields.BRANCH, values_of(fields.BRANCH, found))
-        for number, each in enumerate(found.branches):
-            _write_one(result, f"branch_{number}", each, units)
+        result.set_fields(fields.BRANCH, values_of(fields.BRANCH, answers))
+        for number, curve in enumerate(answers.branches):
+            _write_one(result, f"branch_{number}", curve, units)
         result.commit()
 
 
-def _write_one(result: ResultFile, group: str, found: Followed, units: str) -> None:
+def _write_one(result: ResultFile, group: str, curve: Followed, units: str) -> None:
     """A branch: its motions over `point`, and a group of its special points."""
-    result.axis(group, integer("point", "number of the motion along the branch"), range(len(found.points)))
-    result.set_attributes({"kind": found.kind, "note": found.note}, group)
-    if found.points:
+    result.axis(group, integer("point", "number of the motion along the branch"), range(len(curve.points)))
+    result.set_attributes({"kind": curve.kind, "note": curve.note}, group)
+    if curve.points:
         result.axis(group, integer("multiplier", "number of the multiplier"), range(1, MULTIPLIERS + 1))
         result.axis(group, Field("part", "", "of a complex number", "S"), ["real", "imaginary"])
     for field in fields.BRANCH_POINT:
         own = replace(field, units=units or "1") if field.units == "of the key" else field
         if field.name == "multipliers":
-            if found.points:
-                values = np.full((len(found.points), MULTIPLIERS, 2), np.nan)
-                for row, point in zip(values, found.points, strict=True):
+            if curve.points:
+                values = np.full((len(curve.points), MULTIPLIERS, 2), np.nan)
+                for row, point in zip(values, curve.points, strict=True):
                     for k, factor in enumerate(point.multipliers):
                         row[k] = _finite(factor.real), _finite(factor.imag)
                 result.column(replace(own, kind="f8"), ("point", "multiplier", "part"), values, group)
             continue
         own = replace(own, kind="i8") if field.kind == "?" else own
-        result.column(own, ("point",), [own.read(point) for point in found.points], group)
+        result.column(own, ("point",), [own.read(point) for point in curve.points], group)
     inner = f"{group}/special"
-    marks = found.special
+    marks = curve.special
     result.axis(inner, integer("special", "number of the special point"), range(len(marks)))
     for field in fields.SPECIAL:
         own = replace(field, units=units or "1") if field.units == "of the key" else field

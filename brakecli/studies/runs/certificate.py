@@ -37,28 +37,28 @@ class Certificate:
     @property
     def known_error(self) -> float | None:
         """The estimated error; None where it says nothing, as it is as large as the motion."""
-        return _known(self.estimated_error)
+        return _bound(self.estimated_error)
 
     @property
     def known_by_steps(self) -> float | None:
         """What steps make of it, likewise."""
-        return _known(self.by_steps)
+        return _bound(self.by_steps)
 
     @property
     def known_by_nodes(self) -> float | None:
         """What nodes make of it, likewise."""
-        return _known(self.by_nodes)
+        return _bound(self.by_nodes)
 
     def sentence(self) -> str:
         """The certificate in words."""
         if self.certified:
             return f"error at most {self.estimated_error:.1e}, by {self.method}"
-        kept = f"up to {self.certified_until:.4g} s they keep it"
-        found = f"{self.known_error:.1e}" if self.known_error is not None else "no bound"
-        return f"{self.tolerance:g} cannot be certified: {self.method} give {found}; {kept}"
+        until = f"up to {self.certified_until:.4g} s they keep it"
+        bound = f"{self.known_error:.1e}" if self.known_error is not None else "no bound"
+        return f"{self.tolerance:g} cannot be certified: {self.method} give {bound}; {until}"
 
 
-def _known(error: float | None) -> float | None:
+def _bound(error: float | None) -> float | None:
     """An error that is less than the motion itself."""
     return error if error is not None and error < NOTHING else None
 
@@ -106,7 +106,7 @@ def displacement(system: System) -> tuple[float, float]:
     c = system.coefficients
     initial = system.initial
     load = float(np.abs(values(system.load)).max())
-    heights = sum(float(np.abs(each.g).sum()) for each in (system.shoe, system.wheel))
+    heights = sum(float(np.abs(rough.g).sum()) for rough in (system.shoe, system.wheel))
     pressed = load / (c.c_yy + system.contact_stiffness) + heights
     pulled = load * (abs(c.sin_beta) + c.phi) / c.c_xx if initial.from_equilibrium and c.c_xx > 0.0 else 0.0
     return DISPLACED * max(abs(initial.x), pressed, pulled), DISPLACED * max(abs(initial.y), pressed)
@@ -129,15 +129,15 @@ def compare(coarse: Motion, fine: Motion) -> Apart:
 
     Components below rounding, such as the velocity of a resting shoe, are ignored.
     """
-    system = max(coarse.system, fine.system, key=lambda each: each.interval)
-    every = (round(system.interval / each.system.interval) for each in (coarse, fine))
+    system = max(coarse.system, fine.system, key=lambda motion: motion.interval)
+    every = (round(system.interval / motion.system.interval) for motion in (coarse, fine))
     one, other = (
-        np.ascontiguousarray(each.rows[::n, :4].T) for each, n in zip((coarse, fine), every, strict=True)
+        np.ascontiguousarray(motion.rows[::n, :4].T) for motion, n in zip((coarse, fine), every, strict=True)
     )
     both = min(one.shape[1], other.shape[1])
     whole = one.shape[1] >= other.shape[1]
     one, other = one[:, :both], other[:, :both]  # x, y, vx, vy
-    size = sizes(system, *(np.abs(each).max(axis=1) for each in (one, other)))
+    size = sizes(system, *(np.abs(states).max(axis=1) for states in (one, other)))
     return Apart(system.interval, np.abs(one - other), size, whole)
 
 

@@ -27,7 +27,7 @@ from brakecli.studies.runs.without_waves import without_waves
 _DEFAULT = Thresholds()
 
 
-def given(
+def inputs_of(
     history: History,
     system: System,
     failure: str | None,
@@ -48,7 +48,7 @@ def given(
     return Given(history, context(system, theory), exponent, track or UNTRACKED, continued, failure or "")
 
 
-def asked(system: System) -> System:
+def to_judge(system: System) -> System:
     """The same, whose motion carries along what verdicts ask for: events; a disturbance where waves shake it."""
     shaken = system.steady and system.belt_speed != 0.0 and system.wheel.g.size > 0
     return replace(system, tracked=True, tangents=shaken)
@@ -81,7 +81,7 @@ def in_memory(motion: Motion, system: System, theory: Theory | None = None) -> G
     """A motion to be judged whose samples are in memory; raises FloatingPointError where one overflows."""
     refuse_overflow(motion.rows)
     history = array_history(system.interval, motion.rows)
-    return given(history, system, motion.work.failure_sentence, motion.exponent, motion.track, theory)
+    return inputs_of(history, system, motion.work.failure_sentence, motion.exponent, motion.track, theory)
 
 
 def judged_in_memory(system: System, progress: Progress) -> Judged[Motion]:

@@ -67,7 +67,7 @@ def check(system: System) -> Check:
     own = system.method.own_steps
     fastest = system.natural_frequencies[1]
     waves = 2.0 * system.half_length * system.most_turns
-    found = Check(
+    result = Check(
         system=system,
         link_frequencies=natural_frequencies(system.coefficients, 0.0),
         step=None if own else system.step,
@@ -79,27 +79,27 @@ def check(system: System) -> Check:
         file_size=float(system.samples) * ROW_BYTES + FILE_BYTES,
         adjustments=tuple(adjustments(system)),
     )
-    return replace(found, warnings=tuple(_warnings(found)))
+    return replace(result, warnings=tuple(_warnings(result)))
 
 
-def refuse(found: Check, free_bytes: float = math.inf) -> None:
+def refuse(checked: Check, free_bytes: float = math.inf) -> None:
     """Raise RefusedError where a run would be too large, or unstable by its scheme."""
-    system = found.system
-    growth = found.limits.growth
-    room = f"{found.memory / 1e6:.0f} MB of memory, a file of {found.file_size / 1e6:.3g} MB"
-    size = f"about {found.steps:.3g} steps, {room}"
-    coarser = "solver.tolerance" if found.step is None else "solver.step"
+    system = checked.system
+    growth = checked.limits.growth
+    room = f"{checked.memory / 1e6:.0f} MB of memory, a file of {checked.file_size / 1e6:.3g} MB"
+    size = f"about {checked.steps:.3g} steps, {room}"
+    coarser = "solver.tolerance" if checked.step is None else "solver.step"
     remedy = f"reduce solver.duration, or increase {coarser} or output.sample_interval"
-    if found.steps > MOST_STEPS:
+    if checked.steps > MOST_STEPS:
         raise RefusedError(f"the run is too long: {size}, and {MOST_STEPS:.0e} are the most; {remedy}")
-    if found.file_size > min(MOST_BYTES, free_bytes):
+    if checked.file_size > min(MOST_BYTES, free_bytes):
         raise RefusedError(f"the file would be too large, {free_bytes / 1e6:.3g} MB are free: {size}; {remedy}")
     system.refuse_tables()
     system.refuse_steps(held_bytes(system))
-    if _blows_up(growth, found.steps):
+    if _blows_up(growth, checked.steps):
         longest = _longest_stable_step(system)
         shorter = f"take a solver.step of at most {_down(longest)} s" if longest else "reduce solver.step"
-        what = f"it multiplies disturbances by {growth:.6g} in each of {found.steps} steps"
+        what = f"it multiplies disturbances by {growth:.6g} in each of {checked.steps} steps"
         remedy = f"{shorter}, {system.method.row.unstable}"
         raise RefusedError(f"solver.theta: at this step the scheme is unstable: {what}; {remedy}")
 
@@ -128,37 +128,37 @@ def adjustments(system: System) -> list[str]:
     """Sentences on how a run differs from the numbers of the case: surfaces, start, grid of time, and nodes."""
     method = system.method
     interval = system.interval
-    asked = system.method.step
-    found = [*system.notes]
+    step = system.method.step
+    sentences = [*system.notes]
     start = system.initial
     if start.from_equilibrium and (start.x or start.y):
         moved = f"x = {start.x:g} m and y = {start.y:g} m are added to the position of steady sliding"
-        found.append(f"initial: {moved}")
-    if method.own_steps and asked is not None:
-        kept = "which are exact" if method.row.exact else f"to a tolerance of {method.tolerance:g}"
-        found.append(f"solver.step: not used, {method.scheme} finds its steps itself, {kept}")
-    if asked is None and method.nodes:
-        found.append("contact.nodes: not used, the tolerance chooses nodes itself")
-    if asked and not method.own_steps and abs(interval / asked - system.per_sample) > WHOLE * system.per_sample:
+        sentences.append(f"initial: {moved}")
+    if method.own_steps and step is not None:
+        accuracy = "which are exact" if method.row.exact else f"to a tolerance of {method.tolerance:g}"
+        sentences.append(f"solver.step: not used, {method.scheme} finds its steps itself, {accuracy}")
+    if step is None and method.nodes:
+        sentences.append("contact.nodes: not used, the tolerance chooses nodes itself")
+    if step and not method.own_steps and abs(interval / step - system.per_sample) > WHOLE * system.per_sample:
         fitted = f"{system.step:.9g} s, {system.per_sample} to the sample interval of {interval:g} s"
-        found.append(f"solver.step: reduced from {asked:g} s to {fitted}")
+        sentences.append(f"solver.step: reduced from {step:g} s to {fitted}")
     if system.settles:
         until = f"until the verdict is decided, up to {longest(system):.6g} s, or {system.budget:,} steps in all"
-        found.append(
+        sentences.append(
             f"solver.duration: {system.sampled_duration:.6g} s at first, then twice as long and so on, {until}"
         )
     elif abs(system.duration / interval - system.samples) > WHOLE * system.samples:
         end = f"the next sample at {system.sampled_duration:.9g} s"
-        found.append(f"solver.duration: extended from {system.duration:g} s to {end}")
-    return found
+        sentences.append(f"solver.duration: extended from {system.duration:g} s to {end}")
+    return sentences
 
 
-def _warnings(found: Check) -> Iterator[str]:
+def _warnings(checked: Check) -> Iterator[str]:
     """What a careful user would want to know: one sentence each, with its key and number."""
-    system = found.system
-    per_wave = found.nodes_per_wave
+    system = checked.system
+    per_wave = checked.nodes_per_wave
     if not system.method.own_steps:
-        for what, longest, otherwise in _unresolved(system, found.steps_per_period):
+        for what, longest, otherwise in _unresolved(system, checked.steps_per_period):
             yield f"solver.step: {what}; take a step of at most {_down(longest)} s{otherwise}"
     nyquist = 0.5 / system.interval
     contact = system.natural_frequencies[1]
@@ -170,13 +170,13 @@ def _warnings(found: Check) -> Iterator[str]:
             yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
     if per_wave is not None:
         coarse = _COARSE_NODES * EVALUATORS[system.evaluator].nodes_per_wave
-        asked = min(system.method.nodes or system.nodes, system.nodes)
-        if per_wave * asked < coarse * system.nodes:
+        nodes = min(system.method.nodes or system.nodes, system.nodes)
+        if per_wave * nodes < coarse * system.nodes:
             remedy = f"take at least {math.ceil(system.nodes * coarse / per_wave)}, or leave nodes out"
-            taken = f" ({system.nodes} are taken)" if asked < system.nodes else ""
-            few = f"{per_wave * asked / system.nodes:.3g} nodes per shortest wavelength"
+            taken = f" ({system.nodes} are taken)" if nodes < system.nodes else ""
+            few = f"{per_wave * nodes / system.nodes:.3g} nodes per shortest wavelength"
             yield f"contact.nodes: {few}; {remedy}{taken}"
-    yield from _of_the_scheme(system, found.limits, found.steps)
+    yield from _of_the_scheme(system, checked.limits, checked.steps)
     pad = 2.0 * system.half_length
     around = 2.0 * math.pi * system.radius
     if pad > around:
@@ -237,10 +237,10 @@ def _taken(system: System, steps: int) -> float:
     c = system.coefficients._replace(b_xx=0.0, b_xy=0.0, b_yy=0.0, phi=0.0)
     scheme = module_of(system.method.scheme)
     factors = np.linalg.eigvals(amplification(c, system.weights, scheme, system.contact_stiffness))
-    left = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
-    if left > 1.0 - _ROUNDING:
+    factor = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
+    if factor > 1.0 - _ROUNDING:
         return 0.0
-    return -math.expm1(steps * math.log(left)) if left > 0.0 else 1.0
+    return -math.expm1(steps * math.log(factor)) if factor > 0.0 else 1.0
 
 
 def free_bytes(directory: Path) -> float:

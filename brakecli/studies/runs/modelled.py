@@ -31,4 +31,4 @@ def modelled(motion: Motion) -> tuple[list[str], list[str]]:
         "the load: it is zero": not values(system.load).any(),
         "dashpots: they are zero": c.b_xx == 0.0 == c.b_yy,
     }
-    return [each for each, holds in used.items() if holds], [each for each, holds in left_out.items() if holds]
+    return [text for text, holds in used.items() if holds], [text for text, holds in left_out.items() if holds]

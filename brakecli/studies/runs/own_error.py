@@ -58,10 +58,10 @@ class Known(NamedTuple):
             of = np.where(np.isfinite(size), run.own.worst / size, 0.0)
         return cls(of.max(axis=2), run.own.unsure)
 
-    def by_nodes(self, part: float) -> float:
+    def by_nodes(self, fraction: float) -> float:
         """The largest error by nodes in a part of the run, from its start on."""
         spans = len(self.of)
-        return float(self.of[: math.ceil(min(part, 1.0) * spans), 1].max(initial=0.0))
+        return float(self.of[: math.ceil(min(fraction, 1.0) * spans), 1].max(initial=0.0))
 
     def until(self, limit: float, duration: float) -> float:
         """Up to when (s) it is surely below a limit."""
@@ -102,35 +102,37 @@ def promised(
     counted = 0.0
     steps_before = 0
     most = _FAR * wanted / safety
-    for left in range(_MOST_RUNS, 0, -1):
-        most = most if left > 1 else math.inf
+    for remaining in range(_MOST_RUNS, 0, -1):
+        most = most if remaining > 1 else math.inf
         motion = yield replace(rung, most_error=most)
         seconds += motion.work.solve_seconds
         counted += work_done(motion.system, motion.work)
         motion.work.coarser_steps = steps_before
         steps_before = motion.work.all_steps
-        known = Known.of_run(motion)
-        steps, by_nodes, both = known.of.max(axis=0).tolist()
+        errors = Known.of_run(motion)
+        steps, by_nodes, both = errors.of.max(axis=0).tolist()
         coarse = most < math.inf and motion.work.failure is Failure.COARSE
         reached = float(motion.work.failure_time or 0.0) if coarse else duration
         error = max(safety * both, ROUNDING)
         failed = motion.work.failed and not coarse
-        until = known.until(wanted / safety, duration)
+        until = errors.until(wanted / safety, duration)
         certified = not (failed or coarse) and error <= wanted and until >= duration
         late = counted > MOST_WORK
         if certified or failed or most == math.inf or (late and not coarse):
             break
-        surer = _SURER if known.unsure < duration else math.inf
+        surer = _SURER if errors.unsure < duration else math.inf
         aim = min(AIM * wanted / safety, surer * both)
-        rest = 1.0
+        factor = 1.0
         if coarse:  # errors of steps add up, those of nodes at random; half the aim, as that is a guess
             aim = 0.5 * aim
-            rest = duration / reached
-        found = None if late else finer(rung, max(1.0, rest * steps / aim), max(1.0, rest**0.5 * by_nodes / aim))
-        if found is None and not coarse:
+            factor = duration / reached
+        finer_rung = None
+        if not late:
+            finer_rung = finer(rung, max(1.0, factor * steps / aim), max(1.0, factor**0.5 * by_nodes / aim))
+        if finer_rung is None and not coarse:
             break
-        most = math.inf if found is None else most  # nothing finer helps: the whole of it is worth having
-        rung = found or rung
+        most = math.inf if finer_rung is None else most  # nothing finer helps: the whole of it is worth having
+        rung = finer_rung or rung
     motion.work.solve_seconds = seconds
     if not certified:
         error = max(error, wanted * MISSED) if error < np.inf else 1.0
@@ -158,8 +160,8 @@ def _finer(system: System, rung: System, steps: float, by_nodes: float) -> Syste
         return None
     tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), FINEST)
     more = min(by_nodes ** (1.0 / ORDER_OF_NODES), _MOST)
-    found = _run(system, tolerance, NODES * -int(-rung.nodes * more // NODES))
-    return found if found.method != at else None
+    run = _run(system, tolerance, NODES * -int(-rung.nodes * more // NODES))
+    return run if run.method != at else None
 
 
 def first_of(system: System) -> System:

@@ -73,7 +73,7 @@ def implausible(system: System) -> Iterator[str]:
     """A sentence for each number that is out of its range."""
     schedules = {"load.force": system.load, "wheel.angular_speed": system.belt}
     for key, what, number, side, bound, unit, slip in RANGES:
-        found = number(system)
-        if found < bound if side == "less" else found > bound:
+        value = number(system)
+        if value < bound if side == "less" else value > bound:
             plural = "s" if key in schedules and knots(schedules[key]) > 1 else ""
-            yield f"{key}{plural}: {what}{found:.6g}{unit} is {side} than {bound:g}{unit}; {slip}"
+            yield f"{key}{plural}: {what}{value:.6g}{unit} is {side} than {bound:g}{unit}; {slip}"

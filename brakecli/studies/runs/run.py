@@ -29,10 +29,10 @@ from brakecli.solver.steps.loop import load
 from brakecli.solver.system import System
 from brakecli.solver.track import KINDS, MIN, Track
 from brakecli.studies.runs.certificate import Certificate
-from brakecli.studies.runs.judge import asked, given, judged_in_memory, motion_of, refuse_overflow
+from brakecli.studies.runs.judge import inputs_of, judged_in_memory, motion_of, refuse_overflow, to_judge
 from brakecli.studies.runs.limits import Check, check, free_bytes, refuse, within_range
 from brakecli.studies.runs.modelled import modelled
-from brakecli.studies.runs.settled import settled
+from brakecli.studies.runs.settled import settle
 
 
 @dataclass(frozen=True)
@@ -89,37 +89,37 @@ def run(
     that fails numerically is written up to the failure and reported.
     """
     with within_range():
-        system = asked(system_of(loaded.case))
-        found = check(system)
+        system = to_judge(system_of(loaded.case))
+        checked = check(system)
         with new_result(output, force=force) as result:
-            refuse(found, free_bytes(output.resolve().parent))
-            counted = "steps" if found.step else "samples"
+            refuse(checked, free_bytes(output.resolve().parent))
+            counted = "steps" if checked.step else "samples"
             sink = _history_sink(result, system.interval)
 
-            def shown_by(part: System) -> Progress:
-                total = part.samples if part.method.step is None else part.steps
+            def shown_by(trial: System) -> Progress:
+                total = trial.samples if trial.method.step is None else trial.steps
                 return lambda done: progress(counted, done, total)
 
             if system.settles:
-                ended = settled(system, lambda part: judged_in_memory(part, shown_by(part)))
-                (known, motion, certificate), system, doubts = ended
-                found = check(system)
-                found = replace(found, warnings=(*found.warnings, *doubts))
+                ended = settle(system, lambda trial: judged_in_memory(trial, shown_by(trial)))
+                (decided, motion, certificate), system, doubts = ended
+                checked = check(system)
+                checked = replace(checked, warnings=(*checked.warnings, *doubts))
                 loaded = with_duration(loaded, system.duration)
                 sink(motion.rows)
             else:
-                known = None
+                decided = None
                 motion, certificate = motion_of(system, shown_by(system), sink)
             if not np.isfinite(astuple(motion.energy)).all():  # compiled code overflows silently
                 raise FloatingPointError("an energy overflows")
             history = History(system.interval, result.rows("history"), partial(result.read, "history"))
-            seen = motion.work.failure_sentence, motion.exponent, motion.track
-            verdict = known or classify([given(history, system, *seen)])[0]
+            facts = motion.work.failure_sentence, motion.exponent, motion.track
+            verdict = decided or classify([inputs_of(history, system, *facts)])[0]
             top = _write_spectrum(result, history, verdict)
             changing = None if motion.work.failed else over_time(history, system)
             if changing:
                 _write_over_time(result, changing)
-            warnings = (*found.warnings, *_warnings(motion, certificate), *verdict.notes.values())
+            warnings = (*checked.warnings, *_warnings(motion, certificate), *verdict.notes.values())
             if loaded.case.output.events and motion.track is not None:
                 warnings += _write_events(result, motion.track)
             used, left_out = modelled(motion)
@@ -128,7 +128,7 @@ def run(
                 output=output,
                 verdict=verdict,
                 motion=motion,
-                check=found,
+                check=checked,
                 certificate=certificate,
                 over_time=changing,
                 spectrum_peak=top,
@@ -187,17 +187,18 @@ def _write_spectrum(result: ResultFile, history: History, verdict: Verdict) -> f
     return peak(lines.frequency, lines.density["vx"], duration, *strongest)
 
 
-def _write_over_time(result: ResultFile, found: OverTime) -> None:
+def _write_over_time(result: ResultFile, changes: OverTime) -> None:
     """Write the numbers of each window, the short-time spectra, and the intervals of vibration."""
     for group in ("over_time", "spectrogram"):
-        result.axis(group, fields.WINDOW_TIME, found.time)
+        result.axis(group, fields.WINDOW_TIME, changes.time)
     for field in fields.OVER_TIME:
-        result.column(field, ("time",), field.read(found), "over_time")
-    result.axis("spectrogram", fields.FREQUENCY, found.lines)
-    result.variable("spectrogram", replace(fields.SHORT_TIME, kind="f8"), ("time", "frequency"), found.density)
-    result.axis("vibrations", fields.INTERVAL, np.arange(len(found.vibrations)))
+        result.column(field, ("time",), field.read(changes), "over_time")
+    result.axis("spectrogram", fields.FREQUENCY, changes.lines)
+    result.variable("spectrogram", replace(fields.SHORT_TIME, kind="f8"), ("time", "frequency"), changes.density)
+    result.axis("vibrations", fields.INTERVAL, np.arange(len(changes.vibrations)))
     for field in fields.VIBRATION:
-        result.column(field, ("interval",), [field.read(each) for each in found.vibrations], "vibrations")
+        column = [field.read(vibration) for vibration in changes.vibrations]
+        result.column(field, ("interval",), column, "vibrations")
 
 
 def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
@@ -211,15 +212,15 @@ def _write_unconverged(result: ResultFile, events: NDArray[np.float64]) -> None:
 def _write_events(result: ResultFile, track: Track) -> tuple[str, ...]:
     """Write the events, but turning points of x, as far as they are kept; a warning where some are not."""
     chosen = track.kept.kind > MIN
-    time, kind, x, others = (each[chosen] for each in track.kept)
+    time, kind, x, others = (column[chosen] for column in track.kept)
     event, *columns = fields.EVENTS
     result.axis("events", event, np.arange(len(time)))
     for field, values in zip(columns, (time, np.array(KINDS)[kind], x, *others.T), strict=True):
         result.variable("events", field, ("event",), values)
     earlier = int(track.counts[MIN + 1 :].sum()) - len(time)
     result.set_attributes({"earlier": earlier}, "events")
-    kept = f"output.events: the last {len(time)} events are in the file, {earlier} earlier ones are not"
-    return (kept,) if earlier else ()
+    warning = f"output.events: the last {len(time)} events are in the file, {earlier} earlier ones are not"
+    return (warning,) if earlier else ()
 
 
 def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
@@ -230,5 +231,5 @@ def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """The versions of the numerical libraries."""
-    found = {f"{library.__name__}_version": str(library.__version__) for library in (np, scipy, numba, h5py)}
-    return {**found, "hdf5_version": h5py.version.hdf5_version}
+    numbers = {f"{library.__name__}_version": str(library.__version__) for library in (np, scipy, numba, h5py)}
+    return {**numbers, "hdf5_version": h5py.version.hdf5_version}

@@ -54,7 +54,7 @@ def longest(system: System) -> float:
     return system.sampled_duration * 2.0 ** max(0, math.floor(math.log2(times)))
 
 
-def settled(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
+def settle(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
     """The run of a system; of one that is to settle, the shortest that is decided, or the longest that helps.
 
     It goes by counts and not by the clock, so that a case gives the same bytes wherever it runs. The first run is
@@ -63,39 +63,39 @@ def settled(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
     """
     if not system.settles:
         return Settled(run(system), system)
-    part = system
+    trial = system
     most = longest(system)
     taken = 0
     while True:
-        found = run(part)
-        verdict = found.verdict
-        work = found.motion.work
+        judged = run(trial)
+        verdict = judged.verdict
+        work = judged.motion.work
         taken += work.all_steps
         needed = taken + 2 * work.all_steps  # for a run twice as long
-        kept = found.certificate is None or found.certificate.certified or part.method.row.exact
-        longer = 2.0 * part.sampled_duration
-        if not verdict.unfinished or work.failed or not kept or longer > most or needed > system.budget:
+        accurate = judged.certificate is None or judged.certificate.certified or trial.method.row.exact
+        longer = 2.0 * trial.sampled_duration
+        if not verdict.unfinished or work.failed or not accurate or longer > most or needed > system.budget:
             break
-        part = replace(part, duration=longer)
-    seconds = part.sampled_duration
-    part = replace(part, duration=seconds, budget=0)
+        trial = replace(trial, duration=longer)
+    seconds = trial.sampled_duration
+    trial = replace(trial, duration=seconds, budget=0)
     if work.failed:
-        return Settled(found, part)
+        return Settled(judged, trial)
     if not verdict.unfinished and verdict.regime is not Regime.UNDECIDED:
         note = f"solver.duration: {SETTLED} after {seconds:.6g} s"
-        return Settled(found, replace(part, notes=(*part.notes, note)))
+        return Settled(judged, replace(trial, notes=(*trial.notes, note)))
     if not verdict.unfinished:
         why = "a longer run would not decide more"
-    elif not kept:
+    elif not accurate:
         why = "a longer run would not keep the tolerance; a larger solver.tolerance lets it be longer"
     elif longer > most:
-        wider = f"an output.sample_interval above {part.interval:g} s lets it be longer"
+        wider = f"an output.sample_interval above {trial.interval:g} s lets it be longer"
         why = f"no more than {MOST_SAMPLES:,} samples are tried; {wider}"
     else:
         enough = rounded_up(needed)
         why = f"solver.budget is {system.budget:,} steps; solver.budget = {enough} lets it be twice as long"
     tried = f"not {SETTLED} after {seconds:.6g} s, and {taken:,} steps in all"
-    return Settled(found, part, (f"solver.duration: {tried}; {why}",))
+    return Settled(judged, trial, (f"solver.duration: {tried}; {why}",))
 
 
 def rounded_up(count: int) -> int:

@@ -18,7 +18,7 @@ from brakecli.results.field import plain, values_of
 from brakecli.results.read import open_result
 from brakecli.solver.history import History
 from brakecli.solver.system import System
-from brakecli.studies.runs.judge import asked, motion_of, verdict_in_memory
+from brakecli.studies.runs.judge import motion_of, to_judge, verdict_in_memory
 from brakecli.studies.runs.work import work_of
 
 MOST_WORK = 60.0
@@ -42,14 +42,14 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     with stored_run(path) as run:
         failure = run.attributes.get("failure")
         system = run.system
-        numbers = {each.name: plain(run.attributes.get(each.name)) for each in fields.VERDICT}
+        numbers = {field.name: plain(run.attributes.get(field.name)) for field in fields.VERDICT}
         evidence = {RENAMED.get(name, name): plain(value) for name, value in run.evidence.items()}
         changing = over_time(run.history, system) if not failure and not system.steady else None
-        shown = {each.name: run.attributes.get(each.name) for each in fields.EXPONENT}
+        shown = {field.name: run.attributes.get(field.name) for field in fields.EXPONENT}
         shown |= {"failure": failure, "vibrations": fields.VIBRATIONS.read({"over_time": changing})}
         if _older(evidence):
             if failure is None and work_of(system).amount <= MOST_WORK:
-                motion, _ = motion_of(asked(system))
+                motion, _ = motion_of(to_judge(system))
                 verdict = verdict_in_memory(motion, system, thresholds)
                 return values_of(fields.VERDICT, {"verdict": verdict}) | shown
             evidence = {"unasked": f"brakecli run {path.name} -o NEW.h5"}

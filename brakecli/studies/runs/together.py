@@ -49,8 +49,8 @@ def _runs(system: System) -> Generator[System, Motion, Certified]:
     def finer(run: System, steps: float, by_nodes: float) -> System | None:
         shorter = steps ** (1.0 / ORDER)
         more = by_nodes ** (1.0 / ORDER_OF_NODES)
-        found = rung(shorter * run.per_sample, more * run.nodes / nodes)
-        return None if max(shorter, more) > _MOST or exact_is_cheaper(found, system) else found
+        candidate = rung(shorter * run.per_sample, more * run.nodes / nodes)
+        return None if max(shorter, more) > _MOST or exact_is_cheaper(candidate, system) else candidate
 
     return promised(system, rung(system.interval * max(fastest / turn, waves), 1.0), finer, SAFETY)
 
@@ -75,7 +75,7 @@ def certify_together(
     None where that is not certain, cannot be computed in a lane, or where a motion in a lane does not suffice:
     such a system has to be certified alone.
     """
-    found: list[Certified | None] = [None] * len(systems)
+    certified: list[Certified | None] = [None] * len(systems)
     runs = {i: _runs(system) for i, system in enumerate(systems) if begins_with_steps(system)}
     rungs = dict[int, System]()
 
@@ -84,7 +84,7 @@ def certify_together(
         try:
             rungs[i] = next(runs[i]) if motion is None else runs[i].send(motion)
         except StopIteration as end:
-            found[i] = end.value if end.value.certificate.certified else None
+            certified[i] = end.value if end.value.certificate.certified else None
         except (BrakecliError, ArithmeticError, np.linalg.LinAlgError):
             pass
 
@@ -103,4 +103,4 @@ def certify_together(
         for i, motion in zip(places, motions, strict=True):
             if motion is not None and suffices(motion):
                 go_on(i, motion)
-    return found
+    return certified

@@ -69,11 +69,11 @@ def work_of(system: System) -> Work:
     method = system.method
     pairs = 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
-        each = _STEP_WORK * (1.0 + pairs / _PAIRS)
+        per_step = _STEP_WORK * (1.0 + pairs / _PAIRS)
         if system.finds_patches or system.nodes:
-            each = _STEP_WORK + _EVALUATIONS * evaluation_work(system)
+            per_step = _STEP_WORK + _EVALUATIONS * evaluation_work(system)
         window = _window_work(system, system.sampled_duration * system.fastest_belt)
-        return Work(system.steps, system.steps * each + window)
+        return Work(system.steps, system.steps * per_step + window)
     c = system.coefficients
     alone = method.step is not None
     if method.row.exact:
@@ -87,22 +87,22 @@ def work_of(system: System) -> Work:
     turns = float(max(system.wheel.turns, default=0.0))
     rate += _STEPS_PER_WAVE * turns * (system.fastest_belt + swing) + (c.b_xx + c.b_yy) / _DECAY / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
-    each = _OWN_STEP_WORK * (1.0 + pairs / _OWN_PAIRS)
+    per_step = _OWN_STEP_WORK * (1.0 + pairs / _OWN_PAIRS)
     if system.finds_patches:
         # Rough surfaces that the load presses together are seldom open in part.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
         least_load = float(np.abs(values(system.load)).min())
         open_part = _PRESSED if heights * (c.c_yy + system.contact_stiffness) < least_load else _PLAYS
-        each += _OWN_EVALUATIONS * open_part * evaluation_work(system)
-    return Work(steps, (1.0 if alone else _RUNS) * steps * each)
+        per_step += _OWN_EVALUATIONS * open_part * evaluation_work(system)
+    return Work(steps, (1.0 if alone else _RUNS) * steps * per_step)
 
 
 def work_done(system: System, done: integrate.Work) -> float:
     """The work of a run that was made: of its steps, and of the contact in those that no closed form took."""
-    each = _OWN_STEP_WORK if system.method.own_steps else _STEP_WORK
+    per_step = _OWN_STEP_WORK if system.method.own_steps else _STEP_WORK
     taken = sum(done.evaluators.values())
     open_part = 1.0 - done.evaluators.get("closed-form", 0) / max(taken, 1)
-    return each * done.steps + open_part * done.contact_evaluations * evaluation_work(system)
+    return per_step * done.steps + open_part * done.contact_evaluations * evaluation_work(system)
 
 
 def held_bytes(system: System) -> float:

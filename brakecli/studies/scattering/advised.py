@@ -23,12 +23,12 @@ from brakecli.solver.integrate import Counted
 from brakecli.solver.links import coefficients
 from brakecli.solver.steady_sliding import sliding
 from brakecli.studies.runs.advise import AdviceReport
-from brakecli.studies.scattering.draw import drawn
+from brakecli.studies.scattering.draw import sample_values
 from brakecli.studies.scattering.eigen import ask, asking
 from brakecli.studies.scattering.scatter import squeals
 from brakecli.studies.scattering.study import LoadedStudy, Parameter, Study
-from brakecli.studies.sweeps.listed import GIVEN, Listed
 from brakecli.studies.sweeps.plan import LoadedSweep, sweep_of
+from brakecli.studies.sweeps.point_list import GIVEN, Listed
 from brakecli.studies.sweeps.workers.task import Engine
 
 TOLERANCE = 10.0
@@ -51,16 +51,16 @@ def under_tolerance(report: AdviceReport, case: Case) -> AdviceReport:
     if report.stability.equilibrium is None or report.stability.belt_speed == 0.0:
         return report
 
-    def left(change: Change) -> Left | None:
+    def squeal_of(change: Change) -> Left | None:
         there = None if change.to is None else changed(case, key_path(change.parameter), float(change.rounded))
-        return None if there is None else _left(there)
+        return None if there is None else _squeal(there)
 
     words = f"of ±{TOLERANCE:g} % in stiffness and friction"
-    advice = [replace(each, squeal=left(each)) for each in report.advice]
-    return replace(report, advice=advice, squeal=_left(case), scatter=words)
+    advice = [replace(change, squeal=squeal_of(change)) for change in report.advice]
+    return replace(report, advice=advice, squeal=_squeal(case), scatter=words)
 
 
-def _left(case: Case) -> Left | None:
+def _squeal(case: Case) -> Left | None:
     """The part of such brakes that squeal; None where that is not known."""
     hits = squealing(case)
     return None if hits is None else Left(*Probability.of(hits))
@@ -69,12 +69,12 @@ def _left(case: Case) -> Left | None:
 def squealing(case: Case) -> NDArray[np.bool_] | None:
     """Which of the brakes about a drawing have a mode that grows and swings: sets, samples. None if not known."""
     system = system_of(case)
-    rest = sliding(system)
-    if rest is None or not rest.is_pressed(system.load_at_start) or is_undamped(system.coefficients):
+    equilibrium = sliding(system)
+    if equilibrium is None or not equilibrium.is_pressed(system.load_at_start) or is_undamped(system.coefficients):
         return None
     study = about(case)
-    values = drawn(study)
-    columns = {each.paths[0]: values[..., number] for number, each in enumerate(study.parameter)}
+    values = sample_values(study)
+    columns = {parameter.paths[0]: values[..., number] for number, parameter in enumerate(study.parameter)}
     own = {".".join(path): numbers(case).get(path, 0.0) for path in _SCATTERING}
     drawing: dict[str, Any] = {
         key: columns.get(key, np.full(values.shape[:2], value)) for key, value in own.items()
@@ -91,7 +91,7 @@ def squealing(case: Case) -> NDArray[np.bool_] | None:
         alpha_deg=case.link2.angle_deg,
         phi=case.friction.coefficient,
     )
-    k = rest.stiffness * layer / case.contact.stiffness
+    k = equilibrium.stiffness * layer / case.contact.stiffness
     motion = first_order(c, stiffness_matrix(c, k, np.copysign(phi, system.belt_speed)) / case.shoe.mass)
     roots = np.linalg.eigvals(motion)
     return np.asarray(((roots.real > 0.0) & (roots.imag > 0.0)).any(axis=-1))
@@ -100,13 +100,17 @@ def squealing(case: Case) -> NDArray[np.bool_] | None:
 def about(case: Case) -> Study:
     """Brakes about a drawing: stiffnesses and friction uniform within a tenth of its values."""
     own = numbers(case)
-    known = [".".join(path) for path in _SCATTERING if own.get(path)]
-    laws = [Parameter(key=key, distribution="uniform", tolerance_percent=TOLERANCE).over(case) for key in known]
+    keys = [".".join(path) for path in _SCATTERING if own.get(path)]
+    laws = [Parameter(key=key, distribution="uniform", tolerance_percent=TOLERANCE).over(case) for key in keys]
     return Study(case=GIVEN, samples=SAMPLES, parameter=tuple(laws))
 
 
 def under_scatter(
-    report: AdviceReport, base: LoadedCase, loaded: LoadedStudy, engine_of: Callable[..., Engine], tell: Counted
+    report: AdviceReport,
+    base: LoadedCase,
+    loaded: LoadedStudy,
+    engine_of: Callable[..., Engine],
+    progress: Counted,
 ) -> AdviceReport:
     """The advice with the probability of squeal that each leaves, by eigenvalues, the least first.
 
@@ -114,22 +118,24 @@ def under_scatter(
     scatters itself is shifted with its distribution. What leaves samples without a case has none.
     """
     study = loaded.study.model_copy(update={"method": "eigenvalue", "band": None})
-    values = drawn(study)
+    values = sample_values(study)
 
-    def left(change: Change | None) -> Left | None:
+    def squeal_of(change: Change | None) -> Left | None:
         try:
             sweep = _changed(study.columns(values), change, base)
         except CaseError:
             return None
         with engine_of(sweep.plan, compute=asking(sweep.plan, study.band)) as engine:
-            asked = ask(engine, sweep.plan.points, tell)
-        hits = squeals(study, {name: asked[name] for name in asked.dtype.names or ()})
+            answers = ask(engine, sweep.plan.points, progress)
+        hits = squeals(study, {name: answers[name] for name in answers.dtype.names or ()})
         return Left(*Probability.of(hits.reshape(values.shape[:2])))
 
-    advice = [replace(each, squeal=left(each) if each.to is not None else None) for each in report.advice]
-    advice.sort(key=lambda each: np.inf if each.squeal is None else each.squeal.squeal_probability)
+    advice = [
+        replace(change, squeal=squeal_of(change) if change.to is not None else None) for change in report.advice
+    ]
+    advice.sort(key=lambda change: np.inf if change.squeal is None else change.squeal.squeal_probability)
     ranking = "What leaves least squeal under the study's scatter first"
-    return replace(report, advice=advice, squeal=left(None), scatter="as of the study", ranking=ranking)
+    return replace(report, advice=advice, squeal=squeal_of(None), scatter="as of the study", ranking=ranking)
 
 
 def _changed(columns: dict[str, list[float]], change: Change | None, base: LoadedCase) -> LoadedSweep:
@@ -138,5 +144,5 @@ def _changed(columns: dict[str, list[float]], change: Change | None, base: Loade
         count = len(next(iter(columns.values())))
         to = float(change.rounded)
         own = columns.get(change.parameter, [change.start] * count)
-        columns = columns | {change.parameter: [each + (to - change.start) for each in own]}
+        columns = columns | {change.parameter: [value + (to - change.start) for value in own]}
     return sweep_of({"case": GIVEN, "points": GIVEN}, base, Listed.of([*columns], columns.values()))

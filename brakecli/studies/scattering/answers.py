@@ -45,12 +45,12 @@ class Indices:
             return ""
         decide = "decides" if len(first) == 1 else "decide"
         shares = listed([f"{self.total[name]:.0%}" for name in first])
-        found = f"{listed(first)} {decide} most on {self.of.replace('_', ' ')}, by {shares}"
+        ranking = f"{listed(first)} {decide} most on {self.of.replace('_', ' ')}, by {shares}"
         joint = [name for name in first if self.together.get(name)]
         if not joint:
-            return found
+            return ranking
         who = "" if len(first) == 1 else "each " if joint == first else f"{listed(joint)} "
-        return f"{found}, {who}together with the others"
+        return f"{ranking}, {who}together with the others"
 
     @classmethod
     def find(cls, of: str, names: tuple[str, ...], answers: Floats, seed: int) -> "Indices":
@@ -71,7 +71,7 @@ class Indices:
         half = stats.norm.ppf(0.5 + 0.5 * LEVEL)
         errors = half * np.std(again[:, 1], axis=0)
         together = total - first > half * np.std(again[:, 1] - again[:, 0], axis=0)
-        named = [dict(zip(names, each.tolist(), strict=True)) for each in (first, total, errors)]
+        named = [dict(zip(names, row.tolist(), strict=True)) for row in (first, total, errors)]
         return cls(of, named[0], named[1], named[2], dict(zip(names, together.tolist(), strict=True)))
 
 
@@ -79,8 +79,8 @@ def _indices(answers: Floats) -> tuple[Floats, Floats]:
     a = answers[0][None]
     b = answers[1][None]
     mixed = answers[2:, None]
-    found = stats.sobol_indices(func={"f_A": a, "f_B": b, "f_AB": mixed}, n=answers.shape[1])
-    return np.ravel(found.first_order), np.ravel(found.total_order)
+    indices = stats.sobol_indices(func={"f_A": a, "f_B": b, "f_AB": mixed}, n=answers.shape[1])
+    return np.ravel(indices.first_order), np.ravel(indices.total_order)
 
 
 def listed(words: list[str]) -> str:
@@ -91,5 +91,5 @@ def listed(words: list[str]) -> str:
 
 def quantiles(values: Floats) -> list[float]:
     """The values below which the known ones lie with the probabilities of `SHARES`; empty where none is known."""
-    known = values[np.isfinite(values)]
-    return np.quantile(known, SHARES).tolist() if len(known) else []
+    finite = values[np.isfinite(values)]
+    return np.quantile(finite, SHARES).tolist() if len(finite) else []

@@ -18,7 +18,7 @@ MOST_VALUES = 20_000_000
 """Values of all samples, those of the indices included; a choice."""
 
 
-def drawn(study: Study) -> Floats:
+def sample_values(study: Study) -> Floats:
     """Values of the parameters: sets of samples, samples, parameters. Each set is a sequence of its own.
 
     Samples become as many as the sequences need: a power of two in each for Sobol's. Raises RefusedError where
@@ -63,14 +63,14 @@ def has_indices(study: Study) -> bool:
 
 def _refuse_many(study: Study) -> None:
     """Raise RefusedError where samples and their values would take too much memory."""
-    given = f"samples: are too many{found(study.samples)}"
-    keys = sum(len(each.paths) for each in study.parameter)
+    excess = f"samples: are too many{found(study.samples)}"
+    keys = sum(len(parameter.paths) for parameter in study.parameter)
     if study.samples > MOST_SAMPLES:
-        raise RefusedError(f"{given}; {MOST_SAMPLES} are the most, take fewer")
+        raise RefusedError(f"{excess}; {MOST_SAMPLES} are the most, take fewer")
     of_indices = min(study.samples, _MOST_FOR_INDICES) * (len(study.parameter) + 2) if has_indices(study) else 0
     if (study.samples + of_indices) * keys > MOST_VALUES:
         remedy = 'take fewer samples or keys, or set indices_of = "none"'
-        raise RefusedError(f"{given} for {keys} keys; {remedy}")
+        raise RefusedError(f"{excess} for {keys} keys; {remedy}")
 
 
 def _values(study: Study, parts: Floats) -> Floats:
@@ -79,4 +79,4 @@ def _values(study: Study, parts: Floats) -> Floats:
     if study.correlation is not None:
         parts = stats.norm.cdf(stats.norm.ppf(parts) @ np.linalg.cholesky(np.array(study.correlation)).T)
         parts = np.clip(parts, _LEAST, 1.0 - _LEAST)
-    return np.stack([each.values(parts[..., n]) for n, each in enumerate(study.parameter)], axis=-1)
+    return np.stack([law.values(parts[..., n]) for n, law in enumerate(study.parameter)], axis=-1)

@@ -28,9 +28,9 @@ def asking(plan: Plan, band: tuple[float, ...] | None) -> Compute:
     return partial(_compute, plan, band)
 
 
-def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
+def ask(engine: Engine, count: int, progress: Counted) -> NDArray[Any]:
     """The answers of all samples, in their order."""
-    found = np.zeros(count, ASKED)
+    answers = np.zeros(count, ASKED)
     finished = np.zeros(count, np.bool_)
     queue = TaskQueue(finished, None, workers=engine.workers)
     for task, records, seconds, failure in engine.run(queue.next_task):
@@ -38,29 +38,29 @@ def ask(engine: Engine, count: int, tell: Counted) -> NDArray[Any]:
             continue
         if records is None:
             if not queue.retry(task):
-                place = slice(task.first, task.first + task.size)
-                found[place] = _failed(failure)
-                finished[place] = True
+                rows = slice(task.first, task.first + task.size)
+                answers[rows] = _failed(failure)
+                finished[rows] = True
             continue
         queue.note_time(task, seconds)
-        place = slice(task.first, task.first + task.size)
-        found[place] = np.frombuffer(records, ASKED)
-        finished[place] = True
-        tell("shoes", int(finished.sum()), count)
+        rows = slice(task.first, task.first + task.size)
+        answers[rows] = np.frombuffer(records, ASKED)
+        finished[rows] = True
+        progress("shoes", int(finished.sum()), count)
     if not finished.all():
         raise BrakecliError("samples are missing; run the same command again")
-    return found
+    return answers
 
 
 def _compute(plan: Plan, band: tuple[float, ...] | None, first: int, count: int) -> bytes:
-    found = np.zeros(count, ASKED)
-    for place in range(count):
+    answers = np.zeros(count, ASKED)
+    for index in range(count):
         try:
             with within_range():
-                found[place] = (*answer_of(system_of(plan.case(plan.settings(first + place))), band), b"")
+                answers[index] = (*answer_of(system_of(plan.case(plan.settings(first + index))), band), b"")
         except BrakecliError as error:
-            found[place] = _failed(str(error))
-    return found.tobytes()
+            answers[index] = _failed(str(error))
+    return answers.tobytes()
 
 
 def _failed(reason: str) -> tuple[float, float, float, bytes]:
@@ -76,19 +76,20 @@ def answer_of(system: System, band: tuple[float, ...] | None) -> tuple[float, fl
     belt = system.belt_speed
     if belt == 0.0:
         raise CaseError([Problem(("wheel",), "the wheel stands, so that nothing slides", "give it a speed")])
-    rest = sliding(system)
-    k = rest.stiffness if rest else system.contact_stiffness
+    equilibrium = sliding(system)
+    k = equilibrium.stiffness if equilibrium else system.contact_stiffness
     mode = _counting(modes(c, k, c.grip(belt)), band)
-    if not (rest.is_pressed(system.load_at_start) if rest else system.load_at_start > 0.0 and mode.growth > 0.0):
+    locks = system.load_at_start > 0.0 and mode.growth > 0.0
+    if not (equilibrium.is_pressed(system.load_at_start) if equilibrium else locks):
         raise CaseError([Problem(("load",), UNPRESSED, "press the shoe onto the wheel")])
     critical = critical_friction(system, k)
     return mode.growth, mode.frequency, math.nan if critical is None else critical
 
 
-def _counting(found: list[Mode], band: tuple[float, ...] | None) -> Mode:
+def _counting(candidates: list[Mode], band: tuple[float, ...] | None) -> Mode:
     """The mode that grows fastest; of those in the band where one of them grows."""
     low, high = band or (0.0, math.inf)
     squeals = [
-        each for each in found if each.growth > 0.0 and each.frequency > 0.0 and low <= each.frequency <= high
+        mode for mode in candidates if mode.growth > 0.0 and mode.frequency > 0.0 and low <= mode.frequency <= high
     ]
-    return squeals[0] if squeals else found[0]
+    return squeals[0] if squeals else candidates[0]

@@ -24,13 +24,13 @@ from brakecli.studies.runs.limits import FILE_BYTES
 from brakecli.studies.runs.plausible import implausible
 from brakecli.studies.runs.run import origin
 from brakecli.studies.scattering.answers import Indices, quantiles
-from brakecli.studies.scattering.draw import SAMPLE_BYTES, VALUE_BYTES, drawn, for_indices, has_indices
+from brakecli.studies.scattering.draw import SAMPLE_BYTES, VALUE_BYTES, for_indices, has_indices, sample_values
 from brakecli.studies.scattering.eigen import ask, asking
 from brakecli.studies.scattering.study import SCRAMBLINGS, LoadedStudy, Study
 from brakecli.studies.sweeps.driver import choose_engine, crew, sweep
 from brakecli.studies.sweeps.journal import Journal
-from brakecli.studies.sweeps.listed import GIVEN, Listed
 from brakecli.studies.sweeps.plan import LoadedSweep, Plan, sweep_of
+from brakecli.studies.sweeps.point_list import GIVEN, Listed
 from brakecli.studies.sweeps.result import SweepReport, unit
 from brakecli.studies.sweeps.size import WORKER_BYTES, WORKER_WORK, Size, size_of
 from brakecli.studies.sweeps.workers.task import Compute, Engine
@@ -69,22 +69,22 @@ class ScatterReport:
     @property
     def quantiles(self) -> dict[str, list[float]]:
         """Quantiles of each number, by its name."""
-        return {each.name: each.quantiles for each in self.distributions}
+        return {distribution.name: distribution.quantiles for distribution in self.distributions}
 
     @property
     def probability(self) -> dict[str, float]:
         """Each probability."""
-        return {name: each.value for name, each in self.probabilities.items()}
+        return {name: probability.value for name, probability in self.probabilities.items()}
 
     @property
     def probability_lower(self) -> dict[str, float]:
         """The lower end of its 95 % interval."""
-        return {name: each.lower for name, each in self.probabilities.items()}
+        return {name: probability.lower for name, probability in self.probabilities.items()}
 
     @property
     def probability_upper(self) -> dict[str, float]:
         """The upper end of its 95 % interval."""
-        return {name: each.upper for name, each in self.probabilities.items()}
+        return {name: probability.upper for name, probability in self.probabilities.items()}
 
     @property
     def sentence(self) -> str:
@@ -92,10 +92,10 @@ class ScatterReport:
         squeal, low, high = self.probabilities["squeal"]
         if self.failed == self.samples:
             return f"no sample has an answer: {self.first_failure}"
-        found = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
+        answer = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
         if self.failed:
-            found += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
-        return "; ".join(filter(None, (found, self.indices.sentence)))
+            answer += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
+        return "; ".join(filter(None, (answer, self.indices.sentence)))
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
@@ -125,7 +125,7 @@ class Drawing:
 def draw(loaded: LoadedStudy) -> Drawing:
     """Draw the samples of a study; raises CaseError where its keys do not fit its case."""
     study = loaded.study
-    values = drawn(study)
+    values = sample_values(study)
     others = for_indices(study) if has_indices(study) else None
     beside = others is not None and study.method == "run" and study.indices_of != "squeal"
     together = [values] if others is None or beside else [values, others]
@@ -136,18 +136,18 @@ def draw(loaded: LoadedStudy) -> Drawing:
 
 def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, Any] | None = None) -> LoadedSweep:
     """The samples as the points of a sweep."""
-    columns = loaded.study.columns(np.concatenate([each.reshape(-1, each.shape[-1]) for each in sets]))
+    columns = loaded.study.columns(np.concatenate([values.reshape(-1, values.shape[-1]) for values in sets]))
     listed = Listed.of([*columns], columns.values())
     try:
         return sweep_of({"case": GIVEN, "points": GIVEN, **(tables or {})}, loaded.base, listed)
     except CaseError as error:
-        raise CaseError([_of_sample(each, loaded) for each in error.problems]) from error
+        raise CaseError([_of_sample(problem, loaded) for problem in error.problems]) from error
 
 
 def _of_sample(problem: Problem, loaded: LoadedStudy) -> Problem:
     """What is wrong with a sample, at the line of the parameter that sets it."""
-    paths = [[*map(key_path, each.paths)] for each in loaded.given.parameter]
-    if (number := next((n for n, each in enumerate(paths) if problem.path in each), None)) is None:
+    paths = [[*map(key_path, parameter.paths)] for parameter in loaded.unresolved.parameter]
+    if (number := next((n for n, keys in enumerate(paths) if problem.path in keys), None)) is None:
         return replace(problem, source=loaded.name)
     if (law := loaded.study.parameter[number].distribution) in ("uniform", "triangular"):
         remedy = f"{problem.remedy}: a {law} distribution reaches √{3 if law == 'uniform' else 6} deviations far"
@@ -177,8 +177,8 @@ def scatter(
 
     def by_eigenvalues(sweep: LoadedSweep) -> dict[str, NDArray[Any]]:
         with engine_of(sweep.plan, compute=asking(sweep.plan, study.band)) as engine:
-            found = ask(engine, sweep.plan.points, tell)
-        return {name: found[name] for name in found.dtype.names or ()}
+            answers = ask(engine, sweep.plan.points, tell)
+        return {name: answers[name] for name in answers.dtype.names or ()}
 
     if study.method == "eigenvalue":
         with new_result(output, force=force) as result:
@@ -189,7 +189,7 @@ def scatter(
     beside = by_eigenvalues(drawing.by_eigenvalues) if drawing.by_eigenvalues else None
     reports = list[ScatterReport]()
 
-    def write(result: ResultFile, found: SweepReport, journal: Journal) -> None:
+    def write(result: ResultFile, swept: SweepReport, journal: Journal) -> None:
         columns = {name: journal.column(name) for name in (*_OF_RUNS, "critical")}
         columns["critical_friction"] = columns.pop("critical")
         reports.append(_report(loaded, output, drawing, columns, beside))
@@ -231,7 +231,7 @@ def size_of_study(loaded: LoadedStudy, drawing: Drawing) -> Size:
     if loaded.study.method == "run":
         return size_of(plan, crew(plan), spare=True)
     samples = drawing.samples
-    keys = sum(len(each.paths) for each in loaded.study.parameter)
+    keys = sum(len(parameter.paths) for parameter in loaded.study.parameter)
     workers = 0 if _few(plan) else crew(plan)
     return Size(
         points=plan.points,
@@ -253,37 +253,37 @@ def _report(
     study = loaded.study
     sets, many, _ = drawing.values.shape
     count = sets * many
-    hits = {name: each.reshape(sets, many) for name, each in _outcomes(study, drawing, columns, count).items()}
+    hits = {name: flags.reshape(sets, many) for name, flags in _outcomes(study, drawing, columns, count).items()}
     failed = hits["failed"].ravel()
     apart = "no indices: with correlations, the share of one parameter is not its own"
     index = Indices(study.indices_of, note=apart * (study.correlation is not None and study.indices_of != "none"))
     if drawing.others is not None:
-        rest = {name: each[count:] for name, each in columns.items()} if beside is None else beside
-        of = squeals(study, rest).astype(float) if study.indices_of == "squeal" else rest[study.indices_of]
+        indexed = {name: column[count:] for name, column in columns.items()} if beside is None else beside
+        of = squeals(study, indexed).astype(float) if study.indices_of == "squeal" else indexed[study.indices_of]
         answers = of.reshape(drawing.others.shape[:2])
         index = Indices.find(study.indices_of, study.names, answers, study.seed)
-    kept = {name: each[:count] for name, each in columns.items()}
+    sampled = {name: column[:count] for name, column in columns.items()}
     squealing = hits["squeal"].ravel()
     others = f"{count} samples in place of {study.samples}: as many as {SCRAMBLINGS} sequences need"
-    told = [
-        Distribution(name, units, quantiles(np.where(squealing | (name not in _OF_SQUEAL), kept[name], np.nan)))
+    distributions = [
+        Distribution(name, units, quantiles(np.where(squealing | (name not in _OF_SQUEAL), sampled[name], np.nan)))
         for name, units in _TOLD
-        if name in kept
+        if name in sampled
     ]
     return ScatterReport(
         output=output,
         loaded=loaded,
         samples=count,
         failed=int(failed.sum()),
-        first_failure=kept["reason"][failed][0].decode() if failed.any() else "",
+        first_failure=sampled["reason"][failed][0].decode() if failed.any() else "",
         probabilities={
-            name: Probability.within(each, hits["failed"] & ~each)
-            for name, each in hits.items()
-            if name != "failed" or each.any()
+            name: Probability.within(flags, hits["failed"] & ~flags)
+            for name, flags in hits.items()
+            if name != "failed" or flags.any()
         },
-        distributions=[each for each in told if each.quantiles],
+        distributions=[distribution for distribution in distributions if distribution.quantiles],
         indices=index,
-        columns={**kept, "squeal": squealing.astype(np.int64)},
+        columns={**sampled, "squeal": squealing.astype(np.int64)},
         values=drawing.values,
         notes=[*loaded.beside(loaded.base.case), *filter(None, [index.note, others * (count != study.samples)])],
     )
@@ -293,20 +293,20 @@ def _outcomes(
     study: Study, drawing: Drawing, columns: dict[str, NDArray[Any]], count: int
 ) -> dict[str, NDArray[np.bool_]]:
     """Which of the samples come to what."""
-    kept = {name: each[:count] for name, each in columns.items()}
+    sampled = {name: column[:count] for name, column in columns.items()}
     if study.method == "run":
-        failed = kept["status"] != b"done"
-        found = {each.value: (kept["regime"] == each.value.encode()) & ~failed for each in Regime}
+        failed = sampled["status"] != b"done"
+        outcomes = {regime.value: (sampled["regime"] == regime.value.encode()) & ~failed for regime in Regime}
     else:
-        growth = kept["growth_rate"]
+        growth = sampled["growth_rate"]
         failed = np.isnan(growth)
-        found = {"stable": growth <= 0.0, "unstable": growth > 0.0}
+        outcomes = {"stable": growth <= 0.0, "unstable": growth > 0.0}
     path = ("friction", "coefficient")
     own = np.array([drawing.sweep.plan.settings(n).get(path, np.nan) for n in range(count)])
     own = np.where(np.isnan(own), drawing.sweep.plan.case({}).friction.coefficient, own)
     with np.errstate(invalid="ignore"):
-        below = kept["critical_friction"] < own
-    return found | {"squeal": squeals(study, kept), "critical_below": below, "failed": failed}
+        below = sampled["critical_friction"] < own
+    return outcomes | {"squeal": squeals(study, sampled), "critical_below": below, "failed": failed}
 
 
 def squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
@@ -335,18 +335,19 @@ def _write(result: ResultFile, report: ScatterReport) -> None:
         keys = [*scattering.paths]
         data = report.values[..., number].ravel()
         result.variable("/", Field(name, unit(keys[0]), ", ".join(keys)), ("sample",), data, parameters=keys)
-    for each in fields.SCATTERED:
-        if each.name in report.columns:
-            values = report.columns[each.name]
-            result.column(each, ("sample",), np.char.decode(values) if values.dtype.kind == "S" else values)
+    for field in fields.SCATTERED:
+        if field.name in report.columns:
+            values = report.columns[field.name]
+            result.column(field, ("sample",), np.char.decode(values) if values.dtype.kind == "S" else values)
     result.axis("/", fields.OUTCOME, np.array([*report.probabilities]))
     for name, field in zip(("value", "lower", "upper"), fields.PROBABILITY, strict=True):
-        result.column(field, ("outcome",), [getattr(each, name) for each in report.probabilities.values()])
+        column = [getattr(probability, name) for probability in report.probabilities.values()]
+        result.column(field, ("outcome",), column)
     if report.indices.total:
         result.axis("/", fields.SCATTERING, np.array([*report.indices.total]))
         parts = report.indices.first_order, report.indices.total, report.indices.error
-        for field, part in zip(fields.INDEX, parts, strict=True):
-            result.column(field, ("parameter",), [*part.values()])
+        for field, shares in zip(fields.INDEX, parts, strict=True):
+            result.column(field, ("parameter",), [*shares.values()])
 
 
 _OF_RUNS = ("status", "regime", "excitation", "frequency", "amplitude", "reason")

@@ -56,7 +56,7 @@ class Parameter(Table):
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()
-        given = [name for name in _NUMBERS if getattr(self, name) is not None]
+        present = [name for name in _NUMBERS if getattr(self, name) is not None]
         for name in ("key", "keys"):
             for text in self.paths if getattr(self, name) is not None else ():
                 yield from self._wrong_key(name, text)
@@ -64,10 +64,10 @@ class Parameter(Table):
         bounded = self.distribution in ("uniform", "triangular")
         spread = self.mean is not None
         for one, other in (("low", "high"), ("mean", "deviation")):
-            alone = [name for name in (one, other) if name in given]
+            alone = [name for name in (one, other) if name in present]
             if len(alone) == 1:
                 yield self.wrong(alone[0], "is given alone", f"give {one} and {other} together")
-        if not given:
+        if not present:
             yield Problem(
                 ("low",), MISSING, "give low and high, mean and deviation, or tolerance_percent", instead=_NUMBERS
             )
@@ -78,8 +78,8 @@ class Parameter(Table):
         has_mode = self.distribution == "triangular" and low is not None and high is not None
         beside = mode is not None and low is not None and high is not None and not low <= mode <= high
         keep = "keep one of the two"
-        others = " and ".join(given[:-1])
-        in_part = self.tolerance_percent is not None and len(given) > 1
+        others = " and ".join(present[:-1])
+        in_part = self.tolerance_percent is not None and len(present) > 1
         only = "is only for a triangular distribution with low and high"
         yield from self.broken(
             (in_part, "tolerance_percent", f"is given together with {others}", keep),
@@ -111,17 +111,18 @@ class Parameter(Table):
             key_schema(Case, path)
         except KeyError:
             unknown = True
-        limits = {each: getattr(self, each) for each in ("low", "high", "mean")}
-        values = {each: value for each, value in limits.items() if value is not None}
+        limits = {bound: getattr(self, bound) for bound in ("low", "high", "mean")}
+        values = {bound: value for bound, value in limits.items() if value is not None}
         for where, value in list({name: 0.0}.items() if unknown else values.items())[:2]:
             data: dict[str, Any] = {}
             put(data, path, value, Case, kept=())
             try:
                 Case.model_validate(data)
             except ValidationError as error:
-                wrong = [each for each in wording.problems(error, Case) if each.path == path[: len(each.path)]]
-                for each in wrong:
-                    yield Problem((where,), f"{text} {'is unknown' if unknown else each.what}", each.remedy)
+                problems = wording.problems(error, Case)
+                wrong = [problem for problem in problems if problem.path == path[: len(problem.path)]]
+                for problem in wrong:
+                    yield Problem((where,), f"{text} {'is unknown' if unknown else problem.what}", problem.remedy)
                 if wrong:
                     return
 
@@ -137,15 +138,18 @@ class Parameter(Table):
         elif not isinstance(value, float) or not value:
             what = f"{', '.join(self.paths)} {'is 0' if value == 0.0 else 'has no value'} in the case"
         else:
-            part = 0.01 * self.tolerance_percent
-            low, high = sorted((value * (1.0 - part), value * (1.0 + part)))
+            share = 0.01 * self.tolerance_percent
+            low, high = sorted((value * (1.0 - share), value * (1.0 + share)))
             data = {**self.model_dump(exclude_none=True), "low": low, "high": high}
             del data["tolerance_percent"]
             try:
                 return Parameter.model_validate(data)
             except ValidationError as error:
                 raise CaseError(
-                    [replace(each, path=("tolerance_percent",)) for each in wording.problems(error, Parameter)]
+                    [
+                        replace(problem, path=("tolerance_percent",))
+                        for problem in wording.problems(error, Parameter)
+                    ]
                 ) from None
         raise CaseError([self.wrong("tolerance_percent", f"is part of nothing: {what}", remedy)])
 
@@ -227,8 +231,8 @@ class Study(OverCase):
                 "band", "is no pair of frequencies that rise", "give the lower one, then the higher one"
             )
         taken: set[tuple[str, ...]] = set()
-        for index, each in enumerate(self.parameter):
-            for text in each.paths:
+        for index, parameter in enumerate(self.parameter):
+            for text in parameter.paths:
                 if key_path(text) in taken:
                     yield Problem(
                         ("parameter", index, "key"), "is set twice" + found(text), "let each key path scatter once"
@@ -257,19 +261,19 @@ class Study(OverCase):
     def columns(self, values: Floats) -> dict[str, list[float]]:
         """Values of the parameters, which stand along the last axis, by the key paths that take them."""
         rows = values.reshape(-1, len(self.parameter))
-        return {key: rows[:, n].tolist() for n, each in enumerate(self.parameter) for key in each.paths}
+        return {key: rows[:, n].tolist() for n, parameter in enumerate(self.parameter) for key in parameter.paths}
 
     @property
     def names(self) -> tuple[str, ...]:
         """The first key path of each parameter."""
-        return tuple(each.paths[0] for each in self.parameter)
+        return tuple(parameter.paths[0] for parameter in self.parameter)
 
 
 @dataclass(frozen=True)
 class LoadedStudy:
     """A study with the text that it was read from, and its case."""
 
-    given: Study
+    unresolved: Study
     text: str
     base: LoadedCase
     name: str  # of its file
@@ -280,14 +284,14 @@ class LoadedStudy:
         """The study with its limits; raises CaseError."""
         laws = list[Parameter]()
         wrong = list[Problem]()
-        for number, each in enumerate(self.given.parameter):
+        for number, parameter in enumerate(self.unresolved.parameter):
             try:
-                laws.append(each.over(self.base.case))
+                laws.append(parameter.over(self.base.case))
             except CaseError as error:
                 wrong += (self.at(number, problem) for problem in error.problems)
         if wrong:
             raise CaseError(wrong)
-        return self.given.model_copy(update={"parameter": tuple(laws)})
+        return self.unresolved.model_copy(update={"parameter": tuple(laws)})
 
     def at(self, number: int, problem: Problem) -> Problem:
         """The problem of a parameter, with its line."""
@@ -297,9 +301,9 @@ class LoadedStudy:
     def beside(self, case: Case) -> list[str]:
         """Sentences on values of a drawing that lie beside all samples."""
         own = numbers(case)
-        found = ((each, path, own.get(key_path(path))) for each in self.study.parameter for path in each.paths)
-        said = (each.beside(path, value) for each, path, value in found if isinstance(value, float))
-        return [each for each in said if each]
+        laws = ((law, path, own.get(key_path(path))) for law in self.study.parameter for path in law.paths)
+        said = (law.beside(path, value) for law, path, value in laws if isinstance(value, float))
+        return [sentence for sentence in said if sentence]
 
     @property
     def resolved(self) -> str:
@@ -317,7 +321,7 @@ def parse_study(text: str, name: str, folder: Path, overrides: Sequence[str] = (
 
     Overrides of its own keys belong to the study, all others to its case.
     """
-    given, base, lines = parse_over_case(Study, text, name, folder, overrides, {*Study.model_fields} - {"title"})
-    loaded = LoadedStudy(given, text, base, name, lines)
+    study, base, lines = parse_over_case(Study, text, name, folder, overrides, {*Study.model_fields} - {"title"})
+    loaded = LoadedStudy(study, text, base, name, lines)
     assert loaded.study  # its limits are known
     return loaded

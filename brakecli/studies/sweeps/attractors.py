@@ -45,7 +45,7 @@ class Attractors:
     """What the points of a sweep come to."""
 
     numbers: NDArray[np.int64]  # of the attractor that each point comes to, 0 where it is not known
-    found: list[Attractor]
+    attractors: list[Attractor]
     sentences: list[str]
 
     @classmethod
@@ -59,20 +59,20 @@ class Attractors:
 
         regime, excitation, status = (journal.column(name) for name in ("regime", "excitation", "status"))
         dies = (regime == Regime.DAMPED.encode()) & (excitation == Excitation.NONE.encode())
-        known = (status == Status.DONE.encode()) & (regime != Regime.UNDECIDED.encode())
-        known &= dies | (journal.column("settled") == 1)
-        kinds = np.where(dies, 0, np.where(excitation == Excitation.FORCED.encode(), 1, 2))[known]
-        values = np.where(kinds, [journal.column(name)[known] for name in _NUMBERS], 0.0)
+        decided = (status == Status.DONE.encode()) & (regime != Regime.UNDECIDED.encode())
+        decided &= dies | (journal.column("settled") == 1)
+        kinds = np.where(dies, 0, np.where(excitation == Excitation.FORCED.encode(), 1, 2))[decided]
+        values = np.where(kinds, [journal.column(name)[decided] for name in _NUMBERS], 0.0)
         numbers = np.zeros(regime.shape, np.int64)
         apart = _comparable(values)
-        numbers[known] = told = 1 + _grouped(kinds, apart)
-        found = list[Attractor]()
+        numbers[decided] = labels = 1 + _grouped(kinds, apart)
+        attractors = list[Attractor]()
         sentences = list[str]()
-        for number in range(1, int(told.max(initial=0)) + 1):
-            chosen = told == number
+        for number in range(1, int(labels.max(initial=0)) + 1):
+            chosen = labels == number
             here = numbers == number
             amplitude, frequency, stick, loss = np.median(values[:, chosen], axis=1).tolist()
-            share = Probability.within(here.reshape(1, -1), ~known.reshape(1, -1))
+            share = Probability.within(here.reshape(1, -1), ~decided.reshape(1, -1))
             attractor = Attractor(
                 attractor=number,
                 regime=_most(regime[here]),
@@ -84,16 +84,16 @@ class Attractors:
                 stick_fraction=stick,
                 contact_loss_fraction=loss,
             )
-            found.append(attractor)
+            attractors.append(attractor)
             if np.ptp(apart[:, chosen], axis=1).max() > 2.0:
                 low = values[0, chosen].min()
                 high = values[0, chosen].max()
                 what = f"attractor {number} holds motions with amplitudes of {low:.3g} to {high:.3g} m"
                 sentences.append(f"{what}, and no gap between them: run longer, to see whether they are one")
-        if missing := int((~known).sum()):
+        if missing := int((~decided).sum()):
             what = "fail, are undecided or have not settled, and belong to no attractor"
-            sentences.append(f"{missing} of {known.size} points {what}: their reasons say what to do")
-        return cls(numbers, found, sentences)
+            sentences.append(f"{missing} of {decided.size} points {what}: their reasons say what to do")
+        return cls(numbers, attractors, sentences)
 
 
 def _most(texts: NDArray[np.bytes_]) -> str:

@@ -34,10 +34,10 @@ from brakecli.solver.steady_sliding import (
 )
 from brakecli.solver.system import System
 from brakecli.studies.sweeps.lyapunov import Steady, by_exponents
-from brakecli.studies.sweeps.read_off import PART, explored, on_waves
 from brakecli.studies.sweeps.sustained import sustained
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search, of_changes
+from brakecli.studies.sweeps.windows_of_branch import PART, explored, on_waves
 
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
@@ -54,8 +54,8 @@ def search(critical: Critical, line: Line) -> Search:
     rest_at = cache(partial(_steady, case_at, tabulated if alike else None))
 
     def steady_at(value: float) -> tuple[System, SteadySliding] | None:
-        found = rest_at(value)
-        return found if found and found[1].is_pressed(found[0].load_at_start) else None
+        steady = rest_at(value)
+        return steady if steady and steady[1].is_pressed(steady[0].load_at_start) else None
 
     inner = middles(case_at(critical.lower), line.keys, critical.lower, critical.upper)
     exact = _by_eigenvalues(critical, case_at, rest_at, steady_at, inner)
@@ -63,31 +63,31 @@ def search(critical: Critical, line: Line) -> Search:
         return exact
     case = case_at(critical.lower)
     explorer = explored(critical, case)
-    found = exact
+    result = exact
     waves = bool(system_of(case).wheel.g.size)
     answers = Answers(explorer.explored, line.own)
     if waves:
         repeats = explorer.waves is not None
-        found = on_waves(critical, answers) if repeats else by_exponents(critical, steady_at)
-        found = found._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
+        result = on_waves(critical, answers) if repeats else by_exponents(critical, steady_at)
+        result = result._replace(bias=exact.bias, eigenvalue=exact.eigenvalue)
 
-    lasting = sustained(answers, critical.tolerance, found)
+    lasting = sustained(answers, critical.tolerance, result)
     coexists = [answers.coexists_from]
-    if lasting.at is not None and found.unstable_at(lasting.at) is False:
+    if lasting.at is not None and result.unstable_at(lasting.at) is False:
         notes = [*explorer.notes]
         explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
         explorer.notes = notes  # a user has given no motion
         answers = Answers(explorer.explored, line.own)
         coexists += [answers.coexists_from, lasting.at]  # it need not be periodic
     undamped = is_undamped(system_of(case).coefficients)
-    told = not waves or not (explorer.waves is None or undamped or found.outcome is Outcome.UNDECIDED)
-    words = [answers.sentence] if told else []
-    if lasting.value not in (None, found.value):
+    says = not waves or not (explorer.waves is None or undamped or result.outcome is Outcome.UNDECIDED)
+    words = [answers.sentence] if says else []
+    if lasting.value not in (None, result.value):
         words.append(f"from its own start it vibrates from {lasting.value:.4g} on")
-    return found._replace(
+    return result._replace(
         sustained=lasting.value,
         sustained_outcome=lasting.outcome,
-        coexists_from=min((each for each in coexists if each is not None), default=None),
+        coexists_from=min((value for value in coexists if value is not None), default=None),
         barrier=answers.barrier,
         sentence="; ".join(words),
     )
@@ -129,10 +129,10 @@ def _by_eigenvalues(
             return None
         grip = system.coefficients.grip(system.belt_speed)
         if not system.smooth:
-            if (found := steady(value)) is None:
+            if (state := steady(value)) is None:
                 return None
-            force = found[1].normal_force - PRESSED * abs(system.load_at_start)
-            return [*conditions(links, found[1].stiffness, grip), Rounded(force)]
+            force = state[1].normal_force - PRESSED * abs(system.load_at_start)
+            return [*conditions(links, state[1].stiffness, grip), Rounded(force)]
         if system.belt_speed == 0.0 or system.coefficients.c_xx == 0.0:
             return None
         pressed = links.pressed * Rounded(system.load_at_start)
@@ -142,10 +142,10 @@ def _by_eigenvalues(
 
     @cache
     def in_steps(value: float) -> list[Rounded] | None:
-        if (found := steady_at(value)) is None:
+        if (state := steady_at(value)) is None:
             return None
-        system, rest = found
-        return [Rounded(1.0 + MARGIN - spectral_radius(system, rest.stiffness, system.coefficients.phi))]
+        system, equilibrium = state
+        return [Rounded(1.0 + MARGIN - spectral_radius(system, equilibrium.stiffness, system.coefficients.phi))]
 
     first = steady_at(critical.lower)
     opens = first is not None and first[1].stiffness < _OPENS * first[0].contact_stiffness
@@ -172,8 +172,8 @@ def _by_eigenvalues(
     def searched(margin: Margin, values: list[float], off: Callable[[Change], float]) -> Search:
         if all(steady_at(value) is None for value in values):
             return Search(Outcome.NO_SLIDING)
-        found = (each._replace(error=each.error + off(each)) for each in between(margin, values, width))
-        return of_changes(critical, grows(margin(critical.lower)), found)
+        widened = (change._replace(error=change.error + off(change)) for change in between(margin, values, width))
+        return of_changes(critical, grows(margin(critical.lower)), widened)
 
     values = scanned(SCANNED_WHERE_OPEN if opens else SCANNED_BY_EIGENVALUES)
     exact = searched(signs_at, places(signs_at, sorted({*values, *inner})), by_the_mean)

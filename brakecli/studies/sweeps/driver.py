@@ -48,7 +48,7 @@ class TaskQueue:
         """
         edges = np.flatnonzero(np.diff(finished, prepend=True, append=True)).reshape(-1, 2).tolist()
         self._tasks = deque([Task(first, end - first) for first, end in edges])
-        self._left = sum(task.size for task in self._tasks)
+        self._waiting = sum(task.size for task in self._tasks)
         self._size = size
         self._least = least
         self._task_seconds = max(TASK_SECONDS, workers / TASKS_A_SECOND)
@@ -64,10 +64,10 @@ class TaskQueue:
             return None
         task = self._tasks.popleft()
         rate = self.units / max(self.seconds, 1e-9)
-        by_rest = int(min(LONGEST_TASK * rate, self._part_of_rest * self._left, self._most))
+        by_rest = int(min(LONGEST_TASK * rate, self._part_of_rest * self._waiting, self._most))
         by_time = math.ceil(min(self._task_seconds * rate, self._most))
         size = min(task.size, self._size or max(self._least, by_time, by_rest))
-        self._left -= size
+        self._waiting -= size
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
         return task._replace(size=size)
@@ -81,7 +81,7 @@ class TaskQueue:
         """Queue the units of a task that has failed once more, one by one; False if that was their last try."""
         if not task.last_try:
             units = range(task.first, task.first + task.size)
-            self._left += task.size
+            self._waiting += task.size
             self._tasks.extendleft(Task(unit, 1, last_try=True) for unit in reversed(units))
         return not task.last_try
 
@@ -124,7 +124,7 @@ def sweep(
     *,
     force: bool,
     task_size: int | None = None,
-    begin: Callable[[Size, int], None] = lambda found, resumed: None,
+    begin: Callable[[Size, int], None] = lambda size, resumed: None,
     progress: Callable[[int, int], None] = lambda done, failed: None,
     write: Callable[[ResultFile, SweepReport, Journal], None] = write,
 ) -> SweepReport:
@@ -137,14 +137,14 @@ def sweep(
     """
     plan = loaded.plan
     start = time.perf_counter()
-    found = size_of(plan, engine.workers, spare=engine.spare)
-    engine = engine if found.workers else CallerEngine(engine.compute)
+    size = size_of(plan, engine.workers, spare=engine.spare)
+    engine = engine if size.workers else CallerEngine(engine.compute)
     with new_result(output, force=force) as result:
-        refuse_sweep(found, free_bytes(output.resolve().parent))
+        refuse_sweep(size, free_bytes(output.resolve().parent))
         with open_journal(journal_path(output), plan, force=force) as journal:
             resumed = journal.done
-            begin(found, resumed)
-            queue = TaskQueue(journal.finished, task_size, engine.workers, found.together)
+            begin(size, resumed)
+            queue = TaskQueue(journal.finished, task_size, engine.workers, size.together)
             notes = _compute(engine, journal, queue, progress)
             if missing := int((~journal.finished).sum()):
                 lost = f"{output}: {missing} of {plan.units} points or lines are missing"
@@ -175,15 +175,15 @@ def journal_path(output: Path) -> Path:
 def keeping_points(output: Path) -> Iterator[None]:
     """Add to the message on an interruption, or on a failed write, that finished points are kept, if they are."""
 
-    def kept() -> str:
+    def hint() -> str:
         there = (journal := journal_path(output)).is_file() and not journal.is_symlink()
         return "finished points are kept, and the same command goes on with them" if there else ""
 
     try:
-        with lastly(kept):
+        with lastly(hint):
             yield
     except CannotWriteError as error:
-        raise CannotWriteError("; ".join(filter(None, (str(error), kept())))) from error
+        raise CannotWriteError("; ".join(filter(None, (str(error), hint())))) from error
 
 
 def _compute(

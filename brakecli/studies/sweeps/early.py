@@ -54,25 +54,25 @@ class Ending(NamedTuple):
 
 def early(system: System, theory: Theory | None = None) -> Judged[Ending] | None:
     """The verdict on the motion of a system before its end; None where none is certain."""
-    known = _theory(system, theory)
-    if known is None:
+    linear = _theory(system, theory)
+    if linear is None:
         return None
-    begin = system.initial.beside(known.rest)
-    modes = known.values, known.vectors
+    begin = system.initial.beside(linear.rest)
+    modes = linear.values, linear.vectors
     duration = system.sampled_duration
     end = fate_on_smooth_pads(Shoe.of(system), begin, duration, modes, until=duration)
     motion = end.motion
     if motion is None:
         return None
     if end.orbit is not None:
-        found = _cycle(system, known, end, end.orbit, motion)
+        outcome = _cycle(system, linear, end, end.orbit, motion)
         error = end.orbit.error
     else:
-        found = _linear(system, known, motion)
+        outcome = _linear(system, linear, motion)
         error = ROUNDING
-    if found is None:
+    if outcome is None:
         return None
-    verdict, last = found
+    verdict, last = outcome
     work = Work(steps=end.steps, contact_evaluations=motion.evaluations)
     certificate = Certificate(system.method.tolerance, True, error, duration, "the orbit itself")
     ending = Ending(system, np.array([last]), work)
@@ -88,8 +88,8 @@ def _theory(system: System, theory: Theory | None) -> Linear | None:
     """The theory of steady sliding, where a verdict may be early and eigenvalues say which way it goes."""
     if not may_be_early(system) or system.coefficients.phi == 0.0:
         return None
-    found = theory() if theory else linear_theory(system, system.belt_speed)
-    return found if found is not None and found.direction != 0 else None
+    linear = theory() if theory else linear_theory(system, system.belt_speed)
+    return linear if linear is not None and linear.direction != 0 else None
 
 
 def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, list[float]] | None:
@@ -100,13 +100,13 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
     reached = motion.time
     if reached > start:
         return None
-    rest = np.array(o.rest)
+    equilibrium = np.array(o.rest)
     values = theory.values
     vectors = theory.vectors
-    parts = np.linalg.solve(vectors, motion.state - rest)
+    parts = np.linalg.solve(vectors, motion.state - equilibrium)
 
     def at(time: float) -> Floats:
-        return np.asarray(rest + (vectors @ (parts * np.exp(values * (time - reached)))).real)
+        return np.asarray(equilibrium + (vectors @ (parts * np.exp(values * (time - reached)))).real)
 
     last = at(end)
 
@@ -119,7 +119,7 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
         return 0.5 * float(o.high - o.low)
 
     fades = np.exp(values * (end - reached)) - np.exp(values * (start - reached))
-    height = rest[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
+    height = equilibrium[1] + (vectors[1] @ (parts * fades / values)).real / (end - start)
     force = system.coefficients.grip(theory.belt) * -system.contact_stiffness * float(height)
     answers = Answers(
         duration=end, linear=True, growth_rate=theory.mode.growth, ringing_frequency=theory.mode.frequency
@@ -140,7 +140,7 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
     }
     if decision.regime is not Regime.DAMPED:
         return Verdict(decision, amplitude(start, end), **numbers), last.tolist()
-    first, late = (place * system.interval for place in tenths(system.samples + 1))
+    first, late = (index * system.interval for index in tenths(system.samples + 1))
     first -= system.interval  # its last sample
     before = _swung(system, theory, min(reached, first))
     early = amplitude(reached, first, *before) if reached < first else 0.5 * (before[1] - before[0])
@@ -174,9 +174,9 @@ def _cycle(
     interval = system.interval
     fades = math.log(max(float(way.away) / _SETTLED, 1.0)) / rate
     start = float(way.fell[0]) + fades
-    part = duration - start
+    lasting = duration - start
     hidden = (
-        part < _SETTLED_PART * duration
+        lasting < _SETTLED_PART * duration
         or duration < _CYCLES * WINDOWS * orbit.period
         or orbit.period < _SAMPLES * interval
         or _longest_away(orbit, int(way.sliding)) < _SEEN * interval
@@ -184,7 +184,7 @@ def _cycle(
         or motion.path.beaten.tolist() != [1, 1]  # more than one fall of vx that counts
     )
     if (
-        rate * part < _POWERS or hidden or is_undamped(system.coefficients)
+        rate * lasting < _POWERS or hidden or is_undamped(system.coefficients)
     ):  # without dashpots none is sure to stay
         return None
     answers = Answers(
@@ -192,8 +192,8 @@ def _cycle(
         growth_rate=theory.mode.growth,
         level=orbit.level,
         settled=True,
-        settled_duration=part,
-        cycles=part / orbit.period,
+        settled_duration=lasting,
+        cycles=lasting / orbit.period,
         samples_per_cycle=orbit.period / interval,
         **of_fate(end),
     )

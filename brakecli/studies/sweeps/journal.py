@@ -65,17 +65,17 @@ class Journal:
         """Append the records of finished units, which are sound."""
         count = len(records) // self._unit_bytes
         packed = zlib.compress(records, _LEVEL)
-        place = first, count, len(packed)
+        extent = first, count, len(packed)
         offset = self._file.seek(0, os.SEEK_END)
         try:
             with explained(self.path):
-                self._write(_HEAD.pack(*place, _checksum(place, packed)) + packed)
+                self._write(_HEAD.pack(*extent, _checksum(extent, packed)) + packed)
                 os.fsync(self._file.fileno())
         except CannotWriteError:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), offset)
             raise
-        self._note(place, offset + _HEAD.size, records, packed)
+        self._note(extent, offset + _HEAD.size, records, packed)
 
     @property
     def stored(self) -> np.dtype[Any]:
@@ -109,8 +109,8 @@ class Journal:
 
         A field of several numbers has one more dimension, as long as the record that holds most of them needs.
         """
-        found = [records[name] for _, records in self.blocks()]
-        column = np.concatenate(found).reshape(*self.plan.dimensions.values(), *self.kind[name].shape)
+        blocks = [records[name] for _, records in self.blocks()]
+        column = np.concatenate(blocks).reshape(*self.plan.dimensions.values(), *self.kind[name].shape)
         if self.kind[name].shape:
             column = column[..., : max(1, int(np.isfinite(column).sum(axis=-1).max()))]
         return column
@@ -126,8 +126,8 @@ class Journal:
             data = self._unpacked(*block)
             low = max(begin, first)
             high = min(begin + count, last)
-            found = np.frombuffer(data, self.kind)[(low - begin) * length : (high - begin) * length]
-            records[(low - first) * length : (high - first) * length] = found
+            rows = np.frombuffer(data, self.kind)[(low - begin) * length : (high - begin) * length]
+            records[(low - first) * length : (high - first) * length] = rows
         return records
 
     def _unpacked(self, start: int, end: int, checksum: int) -> bytes:
@@ -148,14 +148,14 @@ class Journal:
     def begin(self, *, force: bool) -> None:
         """Take up what an earlier run has left, or write the header of a new journal."""
         own = identity(self.plan)
-        found = self._file.read(_LONGEST_HEADER)
-        found = found[: found.find(b"\n") + 1] or found
-        if not (refusal := _refusal(found, own)):
-            self._read_blocks(len(found))
+        header = self._file.read(_LONGEST_HEADER)
+        header = header[: header.find(b"\n") + 1] or header
+        if not (refusal := _refusal(header, own)):
+            self._read_blocks(len(header))
             return
-        if found and not force:
+        if header and not force:
             raise RefusedError(f"{self.path}: {refusal}")
-        if found and _FIRST_KEY not in found[:100]:
+        if header and _FIRST_KEY not in header[:100]:
             what = "was not written by this program"
             raise RefusedError(f"{self.path}: {what}; move it away, or choose another output")
         os.ftruncate(self._file.fileno(), 0)
@@ -170,8 +170,8 @@ class Journal:
         """Note the blocks of a journal, and cut off one that was not finished."""
         self._file.seek(offset)
         while len(head := self._file.read(_HEAD.size)) == _HEAD.size:
-            *place, checksum = _HEAD.unpack(head)
-            first, count, length = place
+            *extent, checksum = _HEAD.unpack(head)
+            first, count, length = extent
             if not 0 <= first < first + count <= len(self.finished):
                 break
             packed = self._file.read(min(length, 2 * count * self._unit_bytes + 1000))
@@ -193,15 +193,15 @@ class Journal:
             return None
         return records if stream.eof and not unsound(self.plan, records, count) else None
 
-    def _note(self, place: tuple[int, int, int], offset: int, records: bytes, packed: bytes) -> None:
-        first, count, length = place
+    def _note(self, extent: tuple[int, int, int], offset: int, records: bytes, packed: bytes) -> None:
+        first, count, length = extent
         insort(self._blocks, (first, count, offset, offset + length, zlib.crc32(packed)))
         self.finished[first : first + count] = True
-        found = np.frombuffer(records, self.kind)
-        self.done += len(found)
-        self.failed += int((found["status"] != Status.DONE.encode()).sum())
+        rows = np.frombuffer(records, self.kind)
+        self.done += len(rows)
+        self.failed += int((rows["status"] != Status.DONE.encode()).sum())
         for name in self._longest:
-            self._longest[name] = max(self._longest[name], int(np.char.str_len(found[name]).max()))
+            self._longest[name] = max(self._longest[name], int(np.char.str_len(rows[name]).max()))
 
     def _write(self, data: bytes) -> None:
         """Write all of it: a disk that is nearly full takes a part."""
@@ -232,8 +232,8 @@ def open_journal(path: Path, plan: Plan, *, force: bool) -> Iterator[Journal]:
             yield journal
 
 
-def _checksum(place: tuple[int, int, int], packed: bytes) -> int:
-    return zlib.crc32(packed, zlib.crc32(_PLACE.pack(*place)))
+def _checksum(extent: tuple[int, int, int], packed: bytes) -> int:
+    return zlib.crc32(packed, zlib.crc32(_PLACE.pack(*extent)))
 
 
 def identity(plan: Plan) -> dict[str, Any]:
@@ -244,18 +244,19 @@ def identity(plan: Plan) -> dict[str, Any]:
     sweep = dict(flat(parse(plan.sweep_text)))
     case = {key: value for key, value in flat(plan.case_keys) if not key.endswith(".profile")}
     measured = defaultdict[str, list[int]](list)
-    for path, record in sorted({str(Path(path).absolute()): each for path, each in plan.records.items()}.items()):
+    profiles = {str(Path(path).absolute()): record for path, record in plan.records.items()}
+    for path, record in sorted(profiles.items()):
         checksum = zlib.crc32(record.height, zlib.crc32(record.place, record.is_angle))
         measured[f"checksum of {Path(path).name}"].append(checksum)
     if plan.listed is not None:
         measured["checksum of the points"] = [plan.listed.checksum]
-    return {**fingerprint(), **case, **measured, **{f"sweep {key}": each for key, each in sweep.items()}}
+    return {**fingerprint(), **case, **measured, **{f"sweep {key}": value for key, value in sweep.items()}}
 
 
-def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
+def _refusal(header: bytes, own: Mapping[str, Any]) -> str:
     """Why a journal that begins with a line belongs to another sweep; empty where it belongs to this one."""
     try:
-        there = json.loads(found)
+        there = json.loads(header)
         keys = [key for key in {**there, **own} if there.get(key) != own.get(key)]
     except (ValueError, TypeError, AttributeError, RecursionError):
         return (
@@ -264,8 +265,10 @@ def _refusal(found: bytes, own: Mapping[str, Any]) -> str:
         )
     if not keys:
         return ""
-    were, are = ({key: value_text(held.get(key, "not set")).strip('"') for key in keys} for held in (there, own))
-    each = [f"{key} was {were[key]}, is {are[key]}" for key in keys]
-    each[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
+    were, are = (
+        {key: value_text(entries.get(key, "not set")).strip('"') for key in keys} for entries in (there, own)
+    )
+    differences = [f"{key} was {were[key]}, is {are[key]}" for key in keys]
+    differences[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
     remedy = f"undo the change to go on, or start again with {argument('force')}, which drops the finished points"
-    return f"holds finished points of another sweep: {', '.join(each)}; {remedy}"
+    return f"holds finished points of another sweep: {', '.join(differences)}; {remedy}"

@@ -59,24 +59,24 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
         try:
             return system_of(plan.case(settings))
         except CaseError as error:
-            raise CaseError([replace(each, source=option) for each in error.problems]) from None
+            raise CaseError([replace(problem, source=option) for problem in error.problems]) from None
 
-    values = [axis.value(place) for place in range(axis.size)]
+    values = [axis.value(index) for index in range(axis.size)]
     reports = []
     for value in (values[0], values[-1]):  # so that a wrong end is known before anything is computed
         system_at(value)
-    for place, value in enumerate(values):
-        progress("values", place, axis.size)
+    for index, value in enumerate(values):
+        progress("values", index, axis.size)
         reports.append(stability(system_at(value)))
     there = (report.modes if report.stable is not None and report.belt_speed else () for report in reports)
     entries = []
     for value, report, pair in zip(values, reports, followed(there), strict=True):
         names = ("frequency", "growth", "damping_ratio")
         columns = ([mode and getattr(mode, name) for mode in pair or (None, None)] for name in names)
-        found = dict(zip((field.name for field in fields.MODES), columns, strict=True))
-        entries.append({"value": value, **values_of(fields.VARIED, report), **found})
+        numbers = dict(zip((field.name for field in fields.MODES), columns, strict=True))
+        entries.append({"value": value, **values_of(fields.VARIED, report), **numbers})
     critical = list[float]()
-    known = {value: report for value, report in zip(values, reports, strict=True) if report.belt_speed}
+    moving = {value: report for value, report in zip(values, reports, strict=True) if report.belt_speed}
 
     case = plan.case(dict.fromkeys(plan.settings(0), values[0]))
     whole = isinstance(reduce(getattr, axis.parameter[0].split("."), case), int)
@@ -84,57 +84,57 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
     @cache
     def signs_at(value: float) -> list[Rounded] | None:
         value = round(value) if whole else value
-        if value not in known:
+        if value not in moving:
             progress("critical values", len(critical), len(critical) + 1)
         system = system_at(value)
-        rest = known[value].equilibrium if value in known else sliding(system)
+        equilibrium = moving[value].equilibrium if value in moving else sliding(system)
         return (
             None
-            if rest is None or not rest.is_pressed(system.load_at_start)
+            if equilibrium is None or not equilibrium.is_pressed(system.load_at_start)
             else conditions(
-                links_with(system.coefficients), rest.stiffness, system.coefficients.grip(system.belt_speed)
+                links_with(system.coefficients), equilibrium.stiffness, system.coefficients.grip(system.belt_speed)
             )
         )
 
-    inner = middles(case, list(axis.parameter), values[0], values[-1]) if known else []
-    for change in changes(signs_at, sorted({*known, *inner})):
+    inner = middles(case, list(axis.parameter), values[0], values[-1]) if moving else []
+    for change in changes(signs_at, sorted({*moving, *inner})):
         critical.append(change.value if abs(change.value) > _ZERO * abs(values[-1] - values[0]) else 0.0)
     if values[-1] < values[0]:
         critical.reverse()
     return LockIn(axis, entries, critical)
 
 
-def write(path: Path, loaded: LoadedCase, found: LockIn, *, force: bool) -> None:
+def write(path: Path, loaded: LoadedCase, diagram: LockIn, *, force: bool) -> None:
     """Write the diagram as HDF5, or as CSV where the name ends so; raises UsageError or CannotWriteError."""
     if path.suffix.lower() == ".csv":
         with new_output(path, force=force) as file:
-            file.write(_csv(found).encode())
+            file.write(_csv(diagram).encode())
             file.publish()
         return
-    axis = found.axis
-    names = found.parameters
+    axis = diagram.axis
+    names = diagram.parameters
     with new_result(path, force=force) as result:
         result.set_attributes(origin("stability", loaded.case.title, loaded))
-        result.set_fields(fields.LOCK_IN, values_of(fields.LOCK_IN, found))
-        place = Field(axis.name, unit(names[0]), ", ".join(names))
-        result.variable("/", place, (axis.name,), [entry["value"] for entry in found.entries], parameters=names)
+        result.set_fields(fields.LOCK_IN, values_of(fields.LOCK_IN, diagram))
+        along = Field(axis.name, unit(names[0]), ", ".join(names))
+        result.variable("/", along, (axis.name,), [entry["value"] for entry in diagram.entries], parameters=names)
         result.axis("/", fields.MODE, [1, 2])
         for field in (*fields.VARIED, *fields.MODES):
             dims, kind = ((axis.name, "mode"), "f8") if field in fields.MODES else ((axis.name,), field.kind)
-            column = [entry[field.name] for entry in found.entries]
+            column = [entry[field.name] for entry in diagram.entries]
             data = [text or "" for text in column] if kind == TEXT else column
             result.column(replace(field, kind=kind), dims, data)
         result.commit()
 
 
-def _csv(found: LockIn) -> str:
+def _csv(diagram: LockIn) -> str:
     """A line for each value; what does not exist is empty."""
-    key = ", ".join(found.parameters)
-    columns = {labelled(key, unit(found.parameters[0])): [entry["value"] for entry in found.entries]}
+    key = ", ".join(diagram.parameters)
+    columns = {labelled(key, unit(diagram.parameters[0])): [entry["value"] for entry in diagram.entries]}
     for field in fields.VARIED:
-        columns[labelled(field.name, field.units)] = [entry[field.name] for entry in found.entries]
+        columns[labelled(field.name, field.units)] = [entry[field.name] for entry in diagram.entries]
     for field, mode in ((field, mode) for field in fields.MODES for mode in (1, 2)):
-        values = [entry[field.name][mode - 1] for entry in found.entries]
+        values = [entry[field.name][mode - 1] for entry in diagram.entries]
         columns[labelled(f"{field.name} of mode {mode}", field.units)] = values
     stream = io.StringIO()
     csv.writer(stream, lineterminator="\n").writerows([columns, *zip(*columns.values(), strict=True)])

@@ -17,9 +17,9 @@ from brakecli.solver.motion.rough import RoughFlow, Status, default_cells, defau
 from brakecli.solver.period import LONGEST
 from brakecli.solver.steady_sliding import SteadySliding
 from brakecli.solver.system import System
-from brakecli.studies.sweeps.read_off import in_full_contact
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search, of_changes
+from brakecli.studies.sweeps.windows_of_branch import in_full_contact
 
 VALUES = 33  # of the parameter, between which a change is looked for
 EDGES = 4  # halvings towards the ends of a range in which the answer is not known
@@ -46,7 +46,7 @@ def exponent_length(system: System) -> float:
     return (TRANSIENT + BATCHES * BATCH) * length(system)
 
 
-def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Rounded | None:
+def exponent(system: System, equilibrium: SteadySliding, linear: bool = False) -> Rounded | None:
     """Lyapunov's exponent (1/s) of the motion from steady sliding, by means over batches of a long run.
 
     It is hardly off by more than its error. A motion that leaves what roughness forces on it is on its way to
@@ -57,7 +57,7 @@ def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Round
     flow = RoughFlow(system, default_cells(system))
     span = length(system)
     steps = default_steps(system, span)
-    begin = np.array([rest.x, rest.y, 0.0, 0.0])
+    begin = np.array([equilibrium.x, equilibrium.y, 0.0, 0.0])
     fast = 2.0 * math.pi * system.natural_frequencies[1]
     scales = np.array([1.0, 1.0, fast, fast])
     state = begin
@@ -81,11 +81,11 @@ def exponent(system: System, rest: SteadySliding, linear: bool = False) -> Round
         return None
     if linear:
         half = len(maps) // 2
-        one, other = (_growth(part) / (len(part) * span) for part in (maps[:half], maps[half:]))
+        one, other = (_growth(piece) / (len(piece) * span) for piece in (maps[:half], maps[half:]))
         return Rounded(0.5 * (one + other), 0.5 * abs(one - other))
     means = np.reshape(logs[TRANSIENT : TRANSIENT + batches * BATCH], (batches, BATCH)).mean(axis=1) / span
     longer = means[batches % 2 :].reshape(-1, 2).mean(axis=1)  # what wanders slowly is alike in neighbours
-    off = max(float(each.std(ddof=1)) / math.sqrt(len(each)) for each in (means, longer))
+    off = max(float(rates.std(ddof=1)) / math.sqrt(len(rates)) for rates in (means, longer))
     return Rounded(float(means.mean()), CERTAIN * off)
 
 
@@ -100,16 +100,17 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
 
     @cache
     def unstable(value: float) -> bool | None:
-        found = steady_at(value)
-        if found is None:
+        steady = steady_at(value)
+        if steady is None:
             return True
-        theory = in_full_contact(found[0])
-        known = Rounded(theory.mode.growth, theory.known_to) if theory else None
-        measured = known if known and known.positive is not None else exponent(*found, linear=known is not None)
+        theory = in_full_contact(steady[0])
+        by_theory = Rounded(theory.mode.growth, theory.known_to) if theory else None
+        certain = by_theory is not None and by_theory.positive is not None
+        measured = by_theory if certain else exponent(*steady, linear=by_theory is not None)
         return measured.positive if measured else None
 
     values = np.linspace(critical.lower, critical.upper, VALUES).tolist()
     if all(steady_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
-    found = between_known(unstable, values, critical.tolerance, EDGES)
-    return of_changes(critical, unstable(values[0]), found)
+    changes = between_known(unstable, values, critical.tolerance, EDGES)
+    return of_changes(critical, unstable(values[0]), changes)

@@ -26,17 +26,20 @@ def margins(plan: Plan) -> NDArray[np.float64] | None:
     wheel at rest, or numbers out of range, it is NaN.
     """
     settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= MOST_POINTS else []
-    others = {tuple(value for path, value in each.items() if path != _FRICTION): each for each in settings}
+    others = {
+        tuple(value for path, value in setting.items() if path != _FRICTION): setting for setting in settings
+    }
     try:
-        rough = not all(system_of(plan.case(each)).smooth for each in settings[:: max(1, len(settings) - 1)])
+        rough = not all(system_of(plan.case(setting)).smooth for setting in settings[:: max(1, len(settings) - 1)])
         if not others or len(others) > (MOST_ROUGH if rough else MOST):
             return None
-        known = {key: _critical(plan, each) for key, each in others.items()}
+        critical_of = {key: _critical(plan, setting) for key, setting in others.items()}
         own = plan.case({}).friction.coefficient
     except CaseError:
         return None
-    critical = [known[tuple(value for path, value in each.items() if path != _FRICTION)] for each in settings]
-    friction = [each.get(_FRICTION, own) for each in settings]
+    keys = [tuple(value for path, value in setting.items() if path != _FRICTION) for setting in settings]
+    critical = [critical_of[key] for key in keys]
+    friction = [setting.get(_FRICTION, own) for setting in settings]
     return np.reshape(np.array(critical) - np.array(friction, float), plan.shape)
 
 
@@ -46,7 +49,7 @@ def _critical(plan: Plan, settings: dict[tuple[str, ...], object]) -> float:
         return np.nan
     try:
         with within_range():
-            found = critical_friction(system, system.contact_stiffness)
+            critical = critical_friction(system, system.contact_stiffness)
     except RefusedError:
         return np.nan
-    return LARGEST_FRICTION if found is None else found
+    return LARGEST_FRICTION if critical is None else critical

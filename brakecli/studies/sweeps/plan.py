@@ -22,7 +22,7 @@ from brakecli.case.tables import Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem
 from brakecli.results import fields
 from brakecli.results.toml_lines import Located, innermost, parse
-from brakecli.studies.sweeps.listed import GIVEN, Listed, read_listed
+from brakecli.studies.sweeps.point_list import GIVEN, Listed, read_listed
 from brakecli.studies.sweeps.tables import Axis, Sweep
 
 MOST_TRIED = 1000  # listed numbers of an axis that are tried before the sweep starts; of a range it is both ends
@@ -87,15 +87,15 @@ class Plan:
 
     def settings(self, point: int) -> Settings:
         """What the axes, or the table, set at a point."""
-        found: Settings = {}
+        settings: Settings = {}
         if self.listed is not None:
             return {
                 key_path(key): column[point]
                 for key, column in zip(self.listed.keys, self.listed.columns, strict=True)
             }
-        for axis, place in zip(self.sweep.axis, self.places(point), strict=True):
-            found |= dict.fromkeys((key_path(text) for text in axis.parameter), axis.value(place))
-        return found
+        for axis, index in zip(self.sweep.axis, self.places(point), strict=True):
+            settings |= dict.fromkeys((key_path(text) for text in axis.parameter), axis.value(index))
+        return settings
 
     def case(self, settings: Settings) -> Case:
         """The base case with some values put into it; raises CaseError."""
@@ -108,13 +108,13 @@ class Plan:
             with reading(self.records):
                 return Case.model_validate(data)
         except ValidationError as error:
-            for each in error.errors(include_url=False):
-                path = tuple(map(str, each["loc"]))
+            for fault in error.errors(include_url=False):
+                path = tuple(map(str, fault["loc"]))
                 value = settings.get(path)
-                if each["type"] == "int_type" and isinstance(value, float) and value.is_integer():
+                if fault["type"] == "int_type" and isinstance(value, float) and value.is_integer():
                     return self.case({**settings, path: int(value)})  # a range holds floats
             raise CaseError(
-                [replace(each, source="the point") for each in wording.problems(error, Case)]
+                [replace(problem, source="the point") for problem in wording.problems(error, Case)]
             ) from None
 
     def problems(self, settings: Settings) -> tuple[Problem, ...]:
@@ -128,10 +128,10 @@ class Plan:
 
 def _valid_tables(data: dict[str, Any]) -> Iterator[tuple[str, Table]]:
     """The tables of a case that are right by themselves."""
-    for name, given in data.items():
+    for name, table in data.items():
         if (kind := tables_within(Case).get((name,))) is not None:
             with suppress(ValidationError):
-                yield name, kind.model_validate(given)
+                yield name, kind.model_validate(table)
 
 
 def _tables(data: dict[str, Any]) -> dict[str, Any]:
@@ -194,18 +194,18 @@ def sweep_of(tables: dict[str, Any], base: LoadedCase, listed: Listed | None = N
     try:
         return _checked(parse_table(Sweep, text, name), text, name, base, listed)
     except CaseError as error:  # lines of that text would help nobody
-        raise CaseError([replace(each, line=0) for each in error.problems]) from None
+        raise CaseError([replace(problem, line=0) for problem in error.problems]) from None
 
 
 def _checked(sweep: Sweep, text: str, name: str, base: LoadedCase, listed: Listed | None) -> LoadedSweep:
     """A sweep over a case; raises `CaseError` where its axes, or its listed points, do not fit."""
-    given = tomli_w.dumps(sweep.model_dump(mode="json", exclude_unset=True, exclude_none=True))
+    sweep_text = tomli_w.dumps(sweep.model_dump(mode="json", exclude_unset=True, exclude_none=True))
     keys = [key_path(text) for axis in sweep.axis if not axis.direction for text in axis.parameter]
     keys += [key_path(sweep.critical.parameter)] if sweep.critical else []
     keys += map(key_path, listed.keys if listed else ())
     # Other keys leave the sines of a measured profile as they are, and along a line the wheel keeps its waves.
     anew = any(path[0] == "roughness" or path in (("wheel",), ("wheel", "radius")) for path in keys)
-    plan = Plan(given, given_toml(base.case, profiles=anew), Records(base.records if anew else {}), listed)
+    plan = Plan(sweep_text, given_toml(base.case, profiles=anew), Records(base.records if anew else {}), listed)
     if problems := _wrong_values(plan, text, name) + _wrong_points(plan):
         raise CaseError(problems)
     plan.records = dict(plan.records)  # which reads nothing any more
@@ -221,7 +221,7 @@ def _wrong_points(plan: Plan) -> list[Problem]:
         if problems := plan.problems(plan.settings(point)):
             file = plan.sweep.points
             where = (f"point {point}", 0) if file in (None, GIVEN) else (file, plan.listed.lines[point])
-            return [replace(each, source=where[0], line=where[1]) for each in problems]
+            return [replace(problem, source=where[0], line=where[1]) for problem in problems]
     return []
 
 
@@ -261,7 +261,7 @@ def _wrong_values(plan: Plan, text: str, name: str) -> list[Problem]:
         tried = (axis.start, axis.stop) if axis.values is None else axis.values
         for value in tried[: MOST_TRIED if axis.numeric else None]:  # all profiles are read
             settings = {key_path(parameter): value for parameter in axis.parameter}
-            found = plan.problems(settings)
-            for problem in found if found and all(plan.problems(corner | settings) for corner in corners) else ():
+            wrong = plan.problems(settings)
+            for problem in wrong if wrong and all(plan.problems(corner | settings) for corner in corners) else ():
                 problems.setdefault((line, problem.key), replace(problem, source=name, line=line))
     return list(problems.values())

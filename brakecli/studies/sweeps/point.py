@@ -38,26 +38,27 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
         return np.concatenate([_line(plan, unit) for unit in range(first, first + count)])
     records = np.zeros(count, record_type(plan))
     for start in range(first, first + count, TOGETHER):
-        points = [begun(plan, plan.settings(each)) for each in range(start, min(start + TOGETHER, first + count))]
-        ready = [each for each in points if isinstance(each, Begun)]
-        systems = [each.check.system for each in ready]
+        end = min(start + TOGETHER, first + count)
+        points = [begun(plan, plan.settings(number)) for number in range(start, end)]
+        ready = [point for point in points if isinstance(point, Begun)]
+        systems = [point.check.system for point in ready]
         with within_range():
-            found = judged_together(systems, certify_together(systems, may_suffice))
-        known = dict(zip(map(id, ready), found, strict=True))
-        for place, each in enumerate(points, start - first):
-            record, _ = computed(plan, each, *known.get(id(each), ()))
-            records[place] = record[0]
+            judgements = judged_together(systems, certify_together(systems, may_suffice))
+        judgement_of = dict(zip(map(id, ready), judgements, strict=True))
+        for index, point in enumerate(points, start - first):
+            record, _ = computed(plan, point, *judgement_of.get(id(point), ()))
+            records[index] = record[0]
     return records
 
 
 def _line(plan: Plan, unit: int) -> NDArray[Any]:
     """The records of a line, in the order of the grid."""
     points = line_points(plan, unit)
-    found = np.zeros(len(points), record_type(plan))
-    places = {point: place for place, point in enumerate(sorted(points))}
+    records = np.zeros(len(points), record_type(plan))
+    places = {point: index for index, point in enumerate(sorted(points))}
     for point, record in zip(points, followed(plan, points), strict=True):
-        found[places[point]] = record
-    return found
+        records[places[point]] = record
+    return records
 
 
 def followed(plan: Plan, points: Sequence[int]) -> Iterator[NDArray[Any]]:
@@ -84,10 +85,10 @@ def line_points(plan: Plan, line: int) -> list[int]:
     followed = plan.sweep.axis[plan.followed]
     inner = math.prod(plan.shape[plan.followed + 1 :])
     lines = plan.points // followed.size
-    outer, rest = divmod(line % lines, inner)
+    outer, offset = divmod(line % lines, inner)
     down = followed.direction == "down" or (followed.direction == "both" and line >= lines)
     places = sorted(range(followed.size), key=followed.value, reverse=down)
-    return [(outer * followed.size + place) * inner + rest for place in places]
+    return [(outer * followed.size + index) * inner + offset for index in places]
 
 
 def next_start(outcome: PointRun) -> Settings:
@@ -131,20 +132,20 @@ def begun(plan: Plan, settings: Settings) -> Begun | Exception:
 
 
 def computed(
-    plan: Plan, point: Begun | Exception, known: Judged[Motion] | None = None, theory: Theory | None = None
+    plan: Plan, point: Begun | Exception, judgement: Judged[Motion] | None = None, theory: Theory | None = None
 ) -> tuple[NDArray[Any], PointRun | None]:
     """The record of a point and its run, which is None where it was not possible."""
     try:
         if isinstance(point, Exception):
             raise point
-        outcome = judged(point.case, point.check, known, theory, whole=False)
+        outcome = judged(point.case, point.check, judgement, theory, whole=False)
         values = values_of(fields.POINT, outcome)
         if (critical := plan.sweep.critical) is not None:
             from brakecli.studies.sweeps.critical import search  # only searches wait for the kernels of branches
 
             with within_range():
-                found = search(critical, Line(point.case, [critical.parameter], critical.lower, critical.upper))
-            values |= values_of(fields.CRITICAL, found)
+                result = search(critical, Line(point.case, [critical.parameter], critical.lower, critical.upper))
+            values |= values_of(fields.CRITICAL, result)
     except FAULTS as error:
         reason = OUT_OF_MEMORY if isinstance(error, MemoryError) else "; ".join(str(error).splitlines())
         return blank(record_type(plan), Status.FAILED, reason), None

@@ -38,8 +38,8 @@ def unsound(plan: Plan, records: bytes, units: int) -> str:
     size = len(records)
     if size != units * plan.unit_length * kind.itemsize:
         return f"{size} bytes in place of {units * plan.unit_length} records of {kind.itemsize}"
-    found = np.frombuffer(records, kind)
-    return next((f"a {name} that no point has" for name in kind.names or () if not _fits(name, found[name])), "")
+    rows = np.frombuffer(records, kind)
+    return next((f"a {name} that no point has" for name in kind.names or () if not _fits(name, rows[name])), "")
 
 
 def _fits(name: str, values: NDArray[Any]) -> bool:
@@ -49,7 +49,7 @@ def _fits(name: str, values: NDArray[Any]) -> bool:
     if values.dtype.kind == "f":
         return not (np.abs(values) > LARGEST_SQUARE).any()
     with suppress(UnicodeDecodeError):
-        texts = {each.decode() for each in np.unique(values).tolist()}
+        texts = {text.decode() for text in np.unique(values).tolist()}
         return texts <= {*_KNOWN.get(name, texts)}
     return False
 

@@ -53,9 +53,9 @@ class Findings:
         for start, records in journal.blocks():
             failed = np.flatnonzero(records["status"] != _DONE)
             warned = np.flatnonzero(records["warning_count"])
-            for place in failed[: MOST_FAILURES - len(self.failures)].tolist():
-                point = start + place
-                reason = records["reason"][place].decode()
+            for index in failed[: MOST_FAILURES - len(self.failures)].tolist():
+                point = start + index
+                reason = records["reason"][index].decode()
                 self.failures.append({"point": point, "parameters": _parameters(plan, point), "reason": reason})
             if len(warned) and not warnings:
                 first = records["warning"][warned[0]].decode()
@@ -70,15 +70,17 @@ class Findings:
         self.critical: tuple[int, float, float] | None = None  # how many points have one, the least, the largest
         if (sought := plan.sweep.critical) is not None:
             values = journal.column("critical")
-            known = values[~np.isnan(values)]
-            self.critical = (len(known), float(known.min()), float(known.max())) if len(known) else (0, 0.0, 0.0)
+            finite = values[~np.isnan(values)]
+            self.critical = (0, 0.0, 0.0)
+            if len(finite):
+                self.critical = (len(finite), float(finite.min()), float(finite.max()))
             bars = _on_wide_bars(journal, sought.lower, sought.upper)
             self.sentences += [*_on_lasting_vibration(journal, sought.tolerance), *bars, *_on_no_dashpots(plan)]
         self.attractors: list[Attractor] | None = None
         if plan.over_starts:
             come_to = Attractors.of(journal)
             self.come_to = come_to.numbers
-            self.attractors = come_to.found
+            self.attractors = come_to.attractors
             self.sentences += come_to.sentences
         self.variables: dict[str, Any] | None = None
         if self.points <= MOST_AS_JSON:
@@ -119,12 +121,12 @@ class SweepReport:
 def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     """Everything that the file holds."""
     loaded = report.loaded
-    found = report.findings
+    findings = report.findings
     plan = journal.plan
     sweep = {"sweep_toml": loaded.text, "resolved_sweep_toml": loaded.resolved}
     result.set_attributes({**origin("sweep", loaded.title, loaded.base), **sweep})
     result.set_fields(fields.SWEEP, report.numbers())
-    if "direction" in found.dimensions:
+    if "direction" in findings.dimensions:
         result.axis("/", fields.DIRECTION, np.array(["up", "down"]))
     for axis in plan.sweep.axis:
         _write_along(result, axis.name, axis.parameter, axis.name, _values(axis))
@@ -144,29 +146,29 @@ def write(result: ResultFile, report: SweepReport, journal: Journal) -> None:
     for field in plan.fields:
         attributes = {}
         kind = journal.stored[field.name]
-        dimensions = found.dimensions
+        dimensions = findings.dimensions
         if critical is not None and field in fields.CRITICAL and "f8" in field.kind and not field.units:
             attributes = {"parameter": critical.parameter}
             field = replace(field, units=unit(critical.parameter))
         if kind.shape:
             dimensions = (*dimensions, fields.WINDOW.name)
         result.begin_column(field, dimensions, kind, **attributes)
-    for first, last, where in result.blocks(found.dimensions):
+    for first, last, where in result.blocks(findings.dimensions):
         records = journal.read(first, last)
-        shape = [each.stop - each.start for each in where]
+        shape = [span.stop - span.start for span in where]
         for field in plan.fields:
             values = records[field.name]
             values = values[:, :windows] if values.ndim > 1 else values
             result.fill(field.name, where, values.reshape(*shape, *values.shape[1:]))
-    if found.hysteresis is not None:
-        result.column(*fields.DIFFERENCE, found.dimensions[1:], found.hysteresis)
-    if found.attractors is not None:
-        result.column(*fields.STARTS, found.dimensions, found.come_to)
+    if findings.hysteresis is not None:
+        result.column(*fields.DIFFERENCE, findings.dimensions[1:], findings.hysteresis)
+    if findings.attractors is not None:
+        result.column(*fields.STARTS, findings.dimensions, findings.come_to)
         own, *others = fields.ATTRACTOR
-        result.axis("attractors", own, np.arange(1, len(found.attractors) + 1))
+        result.axis("attractors", own, np.arange(1, len(findings.attractors) + 1))
         for field in others:
-            known = [field.read(each) for each in found.attractors]
-            result.column(field, (own.name,), known, "attractors")
+            numbers = [field.read(attractor) for attractor in findings.attractors]
+            result.column(field, (own.name,), numbers, "attractors")
 
 
 def _write_along(
@@ -174,9 +176,9 @@ def _write_along(
 ) -> None:
     """The values that keys take along a dimension."""
     about = key_schema(Case, key_path(keys[0]))
-    given = {*map(type, values)}
-    number = "i8" if given == {int} and about.get("type") == "integer" else "f8"
-    numeric = all(type(each) in (int, float) and math.isfinite(each) for each in values)
+    types = {*map(type, values)}
+    number = "i8" if types == {int} and about.get("type") == "integer" else "f8"
+    numeric = all(type(value) in (int, float) and math.isfinite(value) for value in values)
     data = np.array(values, number) if numeric else np.array([*map(label, values)])
     result.variable(
         "/", Field(name, unit(keys[0]), ", ".join(keys), number), (dimension,), data, parameters=[*keys]
@@ -189,7 +191,7 @@ def unit(parameter: str) -> str:
 
 
 def _values(axis: Axis) -> list[Any]:
-    return [axis.value(place) for place in range(axis.size)]
+    return [axis.value(index) for index in range(axis.size)]
 
 
 def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
@@ -203,31 +205,31 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
     other = regime[0] != regime[1]
     apart = np.ptp(amplitude, axis=0) > SAME_AMPLITUDE * amplitude.max(axis=0)  # not where one is missing
     on_its_way = ~other & apart & lasting & (journal.column("settled") == 0).any(axis=0)
-    known = done.all(axis=0) & ~on_its_way
-    differ = known & (other | (apart & lasting))
+    comparable = done.all(axis=0) & ~on_its_way
+    differ = comparable & (other | (apart & lasting))
     count = int(differ.sum())
     size = differ.size
-    decided = int(known.sum())
+    decided = int(comparable.sum())
     said = list[str]()
     lasts = regime != b"damped"
-    simple = differ.ndim == 1 and (differ == (lasts[0] != lasts[1]))[known].all()
+    simple = differ.ndim == 1 and (differ == (lasts[0] != lasts[1]))[comparable].all()
     if count and simple and (ends := _ends_of_loop(journal.plan, lasts, done)):
         said.append(f"hysteresis at {count} of {size} points: {ends}")
     elif count:
         where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:_LISTED]]
-        places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in each.items()) for each in where)
+        places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in point.items()) for point in where)
         more = f"; and {count - _LISTED} more" if count > _LISTED else ""
         said.append(f"hysteresis at {count} of {size} points: {places}{more}")
     elif decided:
         those = f" at the {decided} point{'s that are' if decided > 1 else ' that is'} decided"
         those *= decided < size
         same = "the motion is the same on the way up and on the way down"
-        if damped := int((known & ~lasting).sum()):
+        if damped := int((comparable & ~lasting).sum()):
             both = "damped on the way up and on the way down"
             same = both if damped == decided else f"{both} at {damped} of them, and {same} at the others"
         said.append(f"no hysteresis{those}: {same}")
     if decided < size:
-        doubtful = int((~known & apart).sum())
+        doubtful = int((~comparable & apart).sum())
         ways = f"; the amplitudes of the two ways differ at {doubtful} of them" if doubtful else ""
         which = "s, which failed, are undecided or still on their way"
         which = which if size - decided > 1 else ", which failed, is undecided or still on its way"
@@ -243,10 +245,10 @@ def _on_undecided(journal: Journal) -> Iterator[str]:
     if journal.plan.sweep.critical is not None or 4 * count < size or not count:
         return
     alike: dict[str, list[str]] = {}
-    for each in journal.column("reason")[undecided].tolist():
-        alike.setdefault(_NUMBER.sub("", each.decode()), []).append(each.decode())
+    for reason in journal.column("reason")[undecided].tolist():
+        alike.setdefault(_NUMBER.sub("", reason.decode()), []).append(reason.decode())
     most = max(alike.values(), key=len)
-    longest = max(most, key=lambda text: float(found[1]) if (found := _LONGER.search(text)) else 0.0)
+    longest = max(most, key=lambda text: float(match[1]) if (match := _LONGER.search(text)) else 0.0)
     by_itself = journal.plan.case({}).solver.duration == SETTLED
     remedy = '; solver.duration = "settled" runs as long as each needs' * ("run " in longest and not by_itself)
     yield f"{count} of {size} points are undecided, {len(most)} of them: {longest}{remedy}"
@@ -272,11 +274,11 @@ def _on_settled(journal: Journal) -> Iterator[str]:
     count = f"all {size}" if settled.all() else f"{int(settled.sum())} of {size}"
     said = f"{count} points are decided" + (f", in {ran(settled)}" if settled.any() else "")
     yield said + (
-        f"; others ran for {ran(rest)}, and their reasons say more" if (rest := done & ~settled).any() else ""
+        f"; others ran for {ran(others)}, and their reasons say more" if (others := done & ~settled).any() else ""
     )
 
 
-def _ends_of_loop(plan: Plan, lasts: NDArray[Any], known: NDArray[Any]) -> str:
+def _ends_of_loop(plan: Plan, lasts: NDArray[Any], decided: NDArray[Any]) -> str:
     """Where vibration begins and ends on both ways, (2, points), between points that are known.
 
     Empty if on a way it does so more than once, or not at all with every point known.
@@ -285,28 +287,28 @@ def _ends_of_loop(plan: Plan, lasts: NDArray[Any], known: NDArray[Any]) -> str:
     values = np.array(_values(axis))
     said = list[str]()
     for way, row, there, order in zip(
-        ("up", "down"), lasts, known, (np.argsort(values), np.argsort(-values)), strict=True
+        ("up", "down"), lasts, decided, (np.argsort(values), np.argsort(-values)), strict=True
     ):
-        told = _change(row[order], there[order], [label(float(each)) for each in values[order]])
-        if not told:
+        change = _change(row[order], there[order], [label(float(value)) for value in values[order]])
+        if not change:
             return ""
-        verb, place = told
-        said.append(f"{verb} on the way {way} {place}")
+        verb, where = change
+        said.append(f"{verb} on the way {way} {where}")
     return f"along {', '.join(axis.parameter)} the vibration {said[0]}, and {said[1]}"
 
 
-def _change(lasts: NDArray[Any], known: NDArray[Any], values: list[str]) -> tuple[str, str] | None:
+def _change(lasts: NDArray[Any], is_decided: NDArray[Any], values: list[str]) -> tuple[str, str] | None:
     """What a vibration does once along points in their order, and where; None if this is not known."""
-    decided = np.flatnonzero(known)
+    decided = np.flatnonzero(is_decided)
     changes = np.flatnonzero(np.diff(lasts[decided]))
     if len(changes) == 1:
         before, after = decided[changes[0] : changes[0] + 2]
         return "begins" if lasts[after] else "ends", f"between {values[before]} and {values[after]}"
-    if len(changes) or known.all() or not len(decided):
+    if len(changes) or is_decided.all() or not len(decided):
         return None
     first = decided[0]
     last = decided[-1]
-    if last < len(known) - 1:  # the rest of the way is open
+    if last < len(is_decided) - 1:  # the rest of the way is open
         return "lasts" if lasts[last] else "has not begun", f"at {values[last]}, and what follows is not known"
     if first == 0:
         return None
@@ -359,7 +361,7 @@ def _on_no_dashpots(plan: Plan) -> Iterator[str]:
     system = system_of(plan.case({}))
     by_runs = plan.sweep.critical is not None and plan.sweep.critical.method == "simulation"
     if by_runs and len(system.wheel.g) and is_undamped(system.coefficients):
-        from brakecli.studies.sweeps.read_off import LIGHT  # only searches wait for its kernels
+        from brakecli.studies.sweeps.windows_of_branch import LIGHT  # only searches wait for its kernels
 
         none = f"growth that a damping ratio of {LIGHT:g} would stop counts as none"
         yield f"no dashpot acts: {none}; give the links the damping that they have"

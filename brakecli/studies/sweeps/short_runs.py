@@ -42,11 +42,10 @@ def on_short_runs(journal: Journal) -> Iterator[str]:
     growing = list[tuple[float, float]]()
     for index in np.flatnonzero(undecided.ravel())[:MOST].tolist():
         point = index % plan.points
-        found = _theory(plan, point)
-        if found is None:
+        theory = _theory(plan, point)
+        if theory is None:
             continue
-        theory = found
-        rate = found.mode.growth
+        rate = theory.mode.growth
         value = plan.sweep.axis[plan.followed].value(plan.places(point)[plan.followed])
         if rate > 0.0 and amplitudes[index] < _reach(theory):
             before = _theory(plan, _before(plan, point, down=index >= plan.points))
@@ -63,8 +62,8 @@ def _theory(plan: Plan, point: int) -> Linear | None:
     try:
         with within_range():
             system = system_of(plan.case(plan.settings(point)))
-            known = system.smooth and system.steady and not is_undamped(system.coefficients)
-            theory = linear_theory(system, system.belt_speed) if known else None
+            applies = system.smooth and system.steady and not is_undamped(system.coefficients)
+            theory = linear_theory(system, system.belt_speed) if applies else None
     except BrakecliError:
         return None
     return theory if theory and theory.direction and theory.slip is not None else None
@@ -74,17 +73,18 @@ def _before(plan: Plan, point: int, *, down: bool) -> int:
     """The point from which a point is reached; of the first point of a line, the second."""
     assert plan.followed is not None
     axis = plan.sweep.axis[plan.followed]
-    place = plan.places(point)[plan.followed]
+    index = plan.places(point)[plan.followed]
     order = sorted(range(axis.size), key=axis.value, reverse=down)
-    k = order.index(place)
+    k = order.index(index)
     other = order[k - 1] if k else order[min(1, axis.size - 1)]
-    return point + (other - place) * math.prod(plan.shape[plan.followed + 1 :])
+    return point + (other - index) * math.prod(plan.shape[plan.followed + 1 :])
 
 
 def _reach(theory: Linear) -> float:
     """Half of peak to peak of x (m) with which the mode that grows reaches the wheel's speed, or opens the pad."""
     x, y, v_x, _ = np.abs(theory.vectors[:, int(np.argmax(theory.values.real))])
-    bounds = [bound / part for bound, part in ((abs(theory.belt), v_x), (theory.depth, y)) if part > 0.0]
+    limits = ((abs(theory.belt), v_x), (theory.depth, y))
+    bounds = [limit / component for limit, component in limits if component > 0.0]
     return float(x) * min(bounds, default=math.inf)
 
 
@@ -99,17 +99,17 @@ def _growing(theory: Linear, before: Linear) -> float:
     return theory.seconds_to_limit(0.0, np.append(theory.rest + shift, [0.0, 0.0]))
 
 
-def _where(plan: Plan, found: list[tuple[float, float]]) -> str:
+def _where(plan: Plan, growing: list[tuple[float, float]]) -> str:
     """How many points, and from which value to which."""
     assert plan.followed is not None
-    values = sorted({value for value, _ in found})
+    values = sorted({value for value, _ in growing})
     span = label(values[0]) if len(values) == 1 else f"{label(values[0])} to {label(values[-1])}"
-    count = "1 point" if len(found) == 1 else f"{len(found)} points"
+    count = "1 point" if len(growing) == 1 else f"{len(growing)} points"
     return f"at {count}, {', '.join(plan.sweep.axis[plan.followed].parameter)} = {span},"
 
 
-def _remedy(found: list[tuple[float, float]]) -> str:
+def _remedy(growing: list[tuple[float, float]]) -> str:
     """The duration that is long enough for all of the points, and the one that is for the first of them."""
-    least, most = (pick(seconds for _, seconds in found) for pick in (min, max))
+    least, most = (pick(seconds for _, seconds in growing) for pick in (min, max))
     some = f"; {rounded(least, True)} s is enough for some" if least < WORTH * most else ""
     return f"a solver.duration of {rounded(most, True)} s is enough for all{some}"

@@ -18,9 +18,9 @@ from brakecli.solver.history import array_history
 from brakecli.solver.integrate import Motion
 from brakecli.solver.system import System
 from brakecli.studies.runs.certificate import Certificate, Certified
-from brakecli.studies.runs.judge import asked, in_memory, motion_of
+from brakecli.studies.runs.judge import in_memory, motion_of, to_judge
 from brakecli.studies.runs.limits import Check, check, refuse, within_range
-from brakecli.studies.runs.settled import Judged, settled
+from brakecli.studies.runs.settled import Judged, settle
 from brakecli.studies.sweeps.early import Ending, early
 from brakecli.studies.sweeps.record import Status
 
@@ -52,30 +52,30 @@ def simulate(case: Case, *, whole: bool = True) -> PointRun:
 def checked(case: Case) -> Check:
     """What is known of a case before it runs; raises RefusedError where it should not."""
     with within_range():
-        found = check(asked(system_of(case)))
-        refuse(found)
-    return found
+        case_check = check(to_judge(system_of(case)))
+        refuse(case_check)
+    return case_check
 
 
 def judged(
-    case: Case, found: Check, known: Judged[Motion] | None, theory: Theory | None = None, *, whole: bool
+    case: Case, case_check: Check, judgement: Judged[Motion] | None, theory: Theory | None = None, *, whole: bool
 ) -> PointRun:
     """The end of `simulate`, by a motion that is known already with its verdict, or by one that is computed."""
 
-    def run(part: System) -> Judged[Motion | Ending]:
-        if known and part is found.system:
-            return known
-        if not whole and (ended := early(part, theory)) is not None:
+    def run(trial: System) -> Judged[Motion | Ending]:
+        if judgement and trial is case_check.system:
+            return judgement
+        if not whole and (ended := early(trial, theory)) is not None:
             return ended
-        motion, certificate = motion_of(part)
-        (verdict,) = classify([in_memory(motion, part, theory)], in_full=whole)
+        motion, certificate = motion_of(trial)
+        (verdict,) = classify([in_memory(motion, trial, theory)], in_full=whole)
         return Judged(verdict, motion, certificate)
 
     with within_range():
-        ended = settled(found.system, run)
+        ended = settle(case_check.system, run)
     verdict, motion, certificate = ended.judged
     notes = [note for about, note in verdict.notes.items() if about not in _UNTOLD]
-    warnings = [*found.warnings, *ended.warnings, *notes]
+    warnings = [*case_check.warnings, *ended.warnings, *notes]
     work = motion.work
     if work.unconverged_steps and not work.failed:
         warnings.append(f"{work.unconverged_steps} of {work.steps} steps did not converge, as the case allows")
@@ -108,16 +108,16 @@ def judged_together(
     theories = theories_of(systems)
 
     def judge(places: list[int]) -> list[Judged[Motion] | None]:
-        known = {i: each for i in places if (each := certified[i])}
+        lanes = {i: lane for i in places if (lane := certified[i])}
         try:
-            shown = look([in_memory(each.motion, systems[i], theories[i]) for i, each in known.items()])
-            enough = {i: each for i, each in zip(known, shown, strict=True) if each.enough}
-            found = dict(zip(enough, verdicts([*enough.values()], in_full=False), strict=True))
+            shown = look([in_memory(lane.motion, systems[i], theories[i]) for i, lane in lanes.items()])
+            enough = {i: looked for i, looked in zip(lanes, shown, strict=True) if looked.enough}
+            verdict_at = dict(zip(enough, verdicts([*enough.values()], in_full=False), strict=True))
         except (ArithmeticError, np.linalg.LinAlgError, BrakecliError):
-            return [None] if len(places) == 1 else [each for i in places for each in judge([i])]
-        return [Judged(found[i], *known[i]) if i in found else None for i in places]
+            return [None] if len(places) == 1 else [judgement for i in places for judgement in judge([i])]
+        return [Judged(verdict_at[i], *lanes[i]) if i in verdict_at else None for i in places]
 
-    return [*zip(at_once([each and True for each in certified], judge), theories, strict=True)]
+    return [*zip(at_once([lane and True for lane in certified], judge), theories, strict=True)]
 
 
 def verdict_of(case: Case) -> Verdict | None:

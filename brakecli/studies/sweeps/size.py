@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError, RefusedError, key_text
 from brakecli.faces import argument
-from brakecli.studies.runs.judge import asked
+from brakecli.studies.runs.judge import to_judge
 from brakecli.studies.runs.limits import FILE_BYTES, MOST_BYTES, check, refuse, within_range
 from brakecli.studies.runs.plausible import implausible
 from brakecli.studies.runs.together import TOGETHER, loops
@@ -79,17 +79,17 @@ def size_of(plan: Plan, workers: int, *, spare: bool = False) -> Size:
             if critical is not None:
                 run = _SEARCH + (_SEARCH_RUNS * run if critical.method == "simulation" else run)
             work = max(work, run)
-            together = min(together, TOGETHER if plan.followed is None and loops([asked(system)]) else 1)
+            together = min(together, TOGETHER if plan.followed is None and loops([to_judge(system)]) else 1)
     if spare and plan.units * plan.unit_length * work < WORKER_WORK:
         workers = 0
     together = max(1, min(together, plan.units // max(workers, 1)))
     records = plan.passes * plan.points
     in_parent = _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
-    held = _SAMPLE_BYTES * samples * max(workers, 1) * together
+    histories = _SAMPLE_BYTES * samples * max(workers, 1) * together
     return Size(
         points=records,
         workers=workers,
-        memory=(WORKER_BYTES + tables) * (workers + 1) + held + in_parent * records,
+        memory=(WORKER_BYTES + tables) * (workers + 1) + histories + in_parent * records,
         file_size=_RECORD_BYTES * records + FILE_BYTES,
         together=together,
         refused=tuple(failing),
@@ -107,16 +107,16 @@ def _noted(plan: Plan, point: int, failing: list[str]) -> Iterator[None]:
         failing.append(f"point {point}{f' ({where})' if where else ''} will fail: {error}")
 
 
-def refuse_sweep(found: Size, free_bytes: float) -> None:
+def refuse_sweep(size: Size, free_bytes: float) -> None:
     """Raise RefusedError where a sweep would be too large."""
-    if found.points > MOST_POINTS:
+    if size.points > MOST_POINTS:
         most = f"{MOST_POINTS:,} points are the most"
-        raise RefusedError(f"the sweep is too large: {found.sentence()}, and {most}; take fewer points")
-    if 2.0 * found.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
+        raise RefusedError(f"the sweep is too large: {size.sentence()}, and {most}; take fewer points")
+    if 2.0 * size.file_size > min(MOST_BYTES, free_bytes):  # finished points and the result, side by side
         free = f"{free_bytes / 1e6:.3g} MB are free"
         remedy = "free some space, or take fewer points"
-        raise RefusedError(f"the file would be too large, {free}: {found.sentence()}; {remedy}")
+        raise RefusedError(f"the file would be too large, {free}: {size.sentence()}; {remedy}")
     with suppress(ValueError, OSError):  # systems that do not say how much memory they have
-        if found.memory > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
+        if size.memory > os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"):
             remedy = f"take fewer {argument('jobs')}, or sample less often"
-            raise RefusedError(f"the sweep needs more memory than there is: {found.sentence()}; {remedy}")
+            raise RefusedError(f"the sweep needs more memory than there is: {size.sentence()}; {remedy}")

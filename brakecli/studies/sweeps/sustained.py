@@ -17,9 +17,9 @@ from brakecli.solver.period import common_period
 from brakecli.solver.steady_sliding import sliding
 from brakecli.solver.system import System
 from brakecli.studies.runs.limits import within_range
-from brakecli.studies.sweeps.read_off import calm
 from brakecli.studies.sweeps.simulate import verdict_of
 from brakecli.studies.sweeps.windows import Outcome, Search
+from brakecli.studies.sweeps.windows_of_branch import calm
 
 GALLOP = 2.0
 """Factor from one stride to the next in looking for the end of sustained vibration."""
@@ -45,10 +45,10 @@ class Lasting(NamedTuple):
     at: float | None = None
 
 
-def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
+def sustained(answers: Answers, tolerance: float, loss: Search) -> Lasting:
     """Look for the least value at which vibration lasts from the case's own start, as far as it lasts above it.
 
-    From where stability is lost, as was `found`, the search strides down, ever faster, and then narrows down by
+    From where stability is lost, as in `loss`, the search strides down, ever faster, and then narrows down by
     halves. Where sliding is known to be unstable, vibration lasts without a run. `answers` know the stable motions
     that a rough wheel forces and that are no vibrations.
     """
@@ -58,22 +58,22 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
 
     @cache
     def end(value: float) -> Fate:
-        return LASTS if found.unstable_at(value) else _end(answers, value)
+        return LASTS if loss.unstable_at(value) else _end(answers, value)
 
     def ended(value: float | None, outcome: Outcome) -> Lasting:
-        shown = [each for each in seen if end(each).state is not None]
+        shown = [at for at in tried if end(at).state is not None]
         return Lasting(value, outcome, end(min(shown)).state, min(shown)) if shown else Lasting(value, outcome)
 
     def lasts(value: float) -> bool | None:
-        seen.add(value)
+        tried.add(value)
         return end(value).lasts
 
-    seen = set[float]()
+    tried = set[float]()
     just_below = math.nan
-    if found.outcome is Outcome.FOUND:
+    if loss.outcome is Outcome.FOUND:
         # the bracket of a loss of stability may be far narrower than is asked here, and runs there take long
-        just_below = low = max(low, found.lower - 0.5 * tolerance)
-        high = min(high, found.upper)
+        just_below = low = max(low, loss.lower - 0.5 * tolerance)
+        high = min(high, loss.upper)
         stride = tolerance
         while lasts(low) is not False and low > line.low:
             low, high = max(line.low, low - stride), low if lasts(low) else high
@@ -85,11 +85,11 @@ def sustained(answers: Answers, tolerance: float, found: Search) -> Lasting:
     if not lasts(high):
         return ended(None, Outcome.DAMPED)
     if low == just_below:  # vibration begins where stability is lost
-        return ended(found.value, Outcome.FOUND)
+        return ended(loss.value, Outcome.FOUND)
     # Right beside the value sought a vibration dies out, or settles, too slowly to be decided.
     [begun] = between_known(lasts, [low, high], tolerance)
-    known = begun.error <= tolerance
-    return ended(begun.value, Outcome.FOUND) if known else ended(None, Outcome.UNDECIDED)
+    decided = begun.error <= tolerance
+    return ended(begun.value, Outcome.FOUND) if decided else ended(None, Outcome.UNDECIDED)
 
 
 def _end(answers: Answers, value: float) -> Fate:
@@ -106,10 +106,10 @@ def _end(answers: Answers, value: float) -> Fate:
     repeats = system.steady and (not waves or common_period(system) is not None)
     if is_undamped(system.coefficients) or not (slides and repeats):
         return _by_runs(case, system)
-    if (rest := sliding(system)) is None:
+    if (equilibrium := sliding(system)) is None:
         return UNKNOWN
     forced = calm(answers, value) if waves else None
-    return fate(system, system.initial.beside((rest.x, rest.y)), forced=forced)
+    return fate(system, system.initial.beside((equilibrium.x, equilibrium.y)), forced=forced)
 
 
 def _by_runs(case: Case, system: System) -> Fate:
@@ -130,8 +130,8 @@ def _by_runs(case: Case, system: System) -> Fate:
         free = verdict.contact_loss_fraction == verdict.stick_fraction == 0.0
         if verdict.regime is Regime.DAMPED or (free and linear):
             return FADES
-        known = verdict.regime is regime is not Regime.UNDECIDED
-        if known and abs(amplitude - verdict.amplitude) <= SAME * verdict.amplitude:
+        alike = verdict.regime is regime is not Regime.UNDECIDED
+        if alike and abs(amplitude - verdict.amplitude) <= SAME * verdict.amplitude:
             return LASTS
         regime = verdict.regime
         amplitude = verdict.amplitude

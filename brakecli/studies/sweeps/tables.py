@@ -60,18 +60,18 @@ class Axis(Table):
         largest = sys.float_info.max  # a whole number may be larger, and is no float then
         return all(type(value) in (int, float) and -largest <= value <= largest for value in self.values or ())
 
-    def value(self, place: int) -> Any:
+    def value(self, index: int) -> Any:
         """The value at a place along the axis; both ends of a range are exact."""
         if self.values is not None:
-            return self.values[place]
+            return self.values[index]
         assert self.start is not None
         assert self.stop is not None
         last = max(self.size - 1, 1)
-        if place == last:
+        if index == last:
             return self.stop
         if self.spacing == "log":
-            return self.start * (self.stop / self.start) ** (place / last)
-        return self.start + place * (self.stop - self.start) / last
+            return self.start * (self.stop / self.start) ** (index / last)
+        return self.start + index * (self.stop - self.start) / last
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()

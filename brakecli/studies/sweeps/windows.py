@@ -55,26 +55,26 @@ class Search(NamedTuple):
     @property
     def columns(self) -> dict[str, list[float]]:
         """Both ends of the windows and their error bars, each by its name."""
-        found = {"": self.windows, "_error": self.window_errors}
+        ends_of = {"": self.windows, "_error": self.window_errors}
         ends = ("lower", "upper")
-        return {end + of: [each[k] for each in found[of]] for of in found for k, end in enumerate(ends)}
+        return {end + of: [window[k] for window in ends_of[of]] for of in ends_of for k, end in enumerate(ends)}
 
     def unstable_at(self, value: float) -> bool | None:
         """Whether sliding is unstable at a value of the parameter; None where that is not known."""
         if self.outcome is Outcome.FOUND:
             return value >= self.upper
-        known = self.outcome in (Outcome.REGAINED, Outcome.STABLE, Outcome.UNSTABLE)
-        return any(low <= value <= high for low, high in self.windows) if known else None
+        decided = self.outcome in (Outcome.REGAINED, Outcome.STABLE, Outcome.UNSTABLE)
+        return any(low <= value <= high for low, high in self.windows) if decided else None
 
 
-def of_changes(critical: Critical, unstable: bool | None, found: Iterable[Change]) -> Search:
+def of_changes(critical: Critical, unstable: bool | None, in_order: Iterable[Change]) -> Search:
     """The critical value and all windows, by the changes in order; `unstable`: the side of the first value."""
-    changes = [*found]
+    changes = [*in_order]
     begun = unstable is True
-    ends = [(critical.lower, 0.0)] * begun + [(each.value, each.error) for each in changes]
+    ends = [(critical.lower, 0.0)] * begun + [(change.value, change.error) for change in changes]
     ends += [(critical.upper, 0.0)] * (len(ends) % 2)
-    columns = ([each[k] for each in ends] for k in (0, 1))
-    windows, errors = (tuple(zip(each[::2], each[1::2], strict=True)) for each in columns)
+    columns = ([end[k] for end in ends] for k in (0, 1))
+    windows, errors = (tuple(zip(column[::2], column[1::2], strict=True)) for column in columns)
     if not changes:
         outcome = {True: Outcome.UNSTABLE, False: Outcome.STABLE, None: Outcome.UNDECIDED}[unstable]
         return Search(outcome, windows=windows, window_errors=errors)

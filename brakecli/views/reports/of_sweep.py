@@ -16,7 +16,7 @@ from brakecli.results.numbers import stored_numbers
 from brakecli.results.read import StoredResult
 from brakecli.results.stability_fields import BRANCH, LOCK_IN, PROBABLE, SCATTER
 from brakecli.results.toml_lines import Located
-from brakecli.studies.sweeps.listed import GIVEN
+from brakecli.studies.sweeps.point_list import GIVEN
 from brakecli.studies.sweeps.record import Status
 from brakecli.views.plots import style
 from brakecli.views.plots.gather import gather, numeric

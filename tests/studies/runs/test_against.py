@@ -19,7 +19,7 @@ from brakecli.solver.system import System
 from brakecli.studies.runs import against as room
 from brakecli.studies.runs.against import AIM, AIM_OF_NODES, MOST, MOST_RUNS, PART, against, reference_of
 from brakecli.studies.runs.certificate import compare
-from brakecli.studies.runs.judge import asked, motion_of
+from brakecli.studies.runs.judge import motion_of, to_judge
 from brakecli.studies.runs.tolerance import certify
 from tests.campaign import campaign, counts
 from tests.examples import ROUGH, SQUEAL, make
@@ -219,7 +219,7 @@ def test_part_of_the_reference_steps_and_nodes_leave_some_of_the_promise() -> No
 
 def test_a_difference_scheme_has_the_exponent_of_the_motion_of_the_equations() -> None:
     """It carries none along: the motion from the history's half is asked, with a tolerance the reference."""
-    system = asked(system_of(make(ROUGH, solver__duration=0.2)))
+    system = to_judge(system_of(make(ROUGH, solver__duration=0.2)))
     assert system.method.scheme == "two-layer"
     assert solve(system).exponent is None
     motion, _ = motion_of(system)

@@ -23,9 +23,9 @@ from brakecli.solver.integrate import Motion
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
 from brakecli.studies.runs.advise import advise
-from brakecli.studies.runs.judge import asked, motion_of, verdict_in_memory
+from brakecli.studies.runs.judge import motion_of, to_judge, verdict_in_memory
 from brakecli.studies.runs.limits import check
-from brakecli.studies.runs.settled import MOST_SAMPLES, Judged, Settled, longest, settled
+from brakecli.studies.runs.settled import MOST_SAMPLES, Judged, Settled, longest, settle
 from brakecli.studies.sweeps.plan import parse_sweep
 from brakecli.studies.sweeps.workers.task import compute_units
 from tests.analysis.test_verdicts import RINGS
@@ -48,13 +48,13 @@ def judge(part: System) -> Judged[Motion]:
     return Judged(verdict_in_memory(motion, part), motion, certificate)
 
 
-def settle(case: Case) -> Settled[Motion]:
-    return settled(asked(system_of(case)), judge)
+def settle_case(case: Case) -> Settled[Motion]:
+    return settle(to_judge(system_of(case)), judge)
 
 
 def made_up(*durations: float, failure: Failure = Failure.NONE) -> list[float]:
     """The durations (s) of the runs of a case that takes two seconds at first, until one is of these durations."""
-    system = replace(asked(system_of(make(EXACT))), duration=2.0)
+    system = replace(to_judge(system_of(make(EXACT))), duration=2.0)
     tried = list[float]()
     judged = judge(replace(system, duration=0.05))
 
@@ -66,7 +66,7 @@ def made_up(*durations: float, failure: Failure = Failure.NONE) -> list[float]:
         motion = replace(judged.motion, work=replace(judged.motion.work, failure=failure))
         return judged._replace(verdict=replace(verdict, left=0.0), motion=motion)
 
-    settled(system, run)
+    settle(system, run)
     return tried
 
 
@@ -78,7 +78,7 @@ def test_a_damped_run_lasts_until_the_vibration_has_faded_and_no_twice_as_long(b
     A tenth is for the start, which is not linear yet.
     """
     case = make(base, friction__coefficient=0.56)
-    found = settle(case)
+    found = settle_case(case)
     rate = -stability(found.system).modes[0].growth
     assert found.judged.verdict.regime is Regime.DAMPED
     assert found.warnings == ()
@@ -87,7 +87,7 @@ def test_a_damped_run_lasts_until_the_vibration_has_faded_and_no_twice_as_long(b
 
 
 def test_a_vibration_that_lasts_is_run_until_its_numbers_are_those_of_any_longer_run() -> None:
-    found = settle(make(EXACT))
+    found = settle_case(make(EXACT))
     verdict = found.judged.verdict
     long = judge(replace(found.system, duration=8.0 * found.system.duration)).verdict
     assert (verdict.regime, verdict.settled) == (Regime.RELAXATION, True)
@@ -96,7 +96,7 @@ def test_a_vibration_that_lasts_is_run_until_its_numbers_are_those_of_any_longer
 
 def test_a_run_goes_on_while_the_friction_force_rings_beside_a_settled_x() -> None:
     """Its torque's variation is not known before; half of the run does not know it."""
-    found = settle(make({**RINGS, "solver": {"step": 1e-4, "duration": "settled"}}))
+    found = settle_case(make({**RINGS, "solver": {"step": 1e-4, "duration": "settled"}}))
     assert found.warnings == ()
     assert found.judged.verdict.torque_variation is not None
     half = judge(replace(found.system, duration=0.5 * found.system.duration)).verdict
@@ -116,25 +116,25 @@ def test_a_run_that_fails_is_not_made_longer() -> None:
 
 def test_a_run_that_cannot_keep_its_tolerance_is_not_made_longer() -> None:
     """On rough pads, where ever finer runs have been tried; one exact run more or less does not matter."""
-    system = asked(system_of(make(ROUGH, solver__step=None, contact__nodes=None, solver__duration="settled")))
+    system = to_judge(system_of(make(ROUGH, solver__step=None, contact__nodes=None, solver__duration="settled")))
     found = judge(replace(system, duration=0.02))
     assert found.certificate is not None
     broken = found._replace(
         verdict=replace(found.verdict, decision=Decision("", longer=True)),
         certificate=replace(found.certificate, certified=False),
     )
-    ended = settled(system, lambda part: broken)
+    ended = settle(system, lambda part: broken)
     assert ended.system.duration == pytest.approx(system.duration, rel=1e-3)
     assert "a longer run would not keep the tolerance" in ended.warnings[0]
 
 
 def test_the_longest_run_is_the_limit_and_is_told() -> None:
     """Without dashpots no amplitude is that of any longer run. The verdict stays what it is."""
-    system = asked(system_of(make(EXACT, link1__damping=0.0, link2__damping=0.0, output__sample_interval=5e-4)))
+    system = to_judge(system_of(make(EXACT, link1__damping=0.0, link2__damping=0.0, output__sample_interval=5e-4)))
     judged = judge(replace(system, duration=0.2))
     lasting = Decision("", Regime.QUASI_HARMONIC, Excitation.SELF_EXCITED)
     open_ = judged._replace(verdict=replace(judged.verdict, decision=lasting, settled=False, longer=True))
-    found = settled(system, lambda part: open_)
+    found = settle(system, lambda part: open_)
     assert found.judged.verdict.regime is Regime.QUASI_HARMONIC
     assert found.system.duration == pytest.approx(longest(system))
     assert MOST_SAMPLES / 2 < found.system.samples <= MOST_SAMPLES
@@ -143,7 +143,7 @@ def test_the_longest_run_is_the_limit_and_is_told() -> None:
 
 def test_a_budget_of_steps_ends_what_is_not_decided_and_counts_all_runs() -> None:
     """A thousand steps for a second: runs of 2, 4 and 8 s take 14,000 in all, and with one of 16 s 30,000."""
-    system = replace(asked(system_of(make(EXACT))), duration=2.0)
+    system = replace(to_judge(system_of(make(EXACT))), duration=2.0)
     tried = list[float]()
     judged = judge(replace(system, duration=0.05))
     open_ = replace(judged.verdict, decision=UNDECIDED)
@@ -154,20 +154,20 @@ def test_a_budget_of_steps_ends_what_is_not_decided_and_counts_all_runs() -> Non
         work = replace(judged.motion.work, steps=steps, coarser_steps=steps // 4)
         return judged._replace(verdict=open_, motion=replace(judged.motion, work=work))
 
-    (warning,) = settled(replace(system, budget=29_999), run).warnings
+    (warning,) = settle(replace(system, budget=29_999), run).warnings
     assert tried == [2.0, 4.0, 8.0]
     assert warning.startswith("solver.duration: not settled after 8 s, and 14,000 steps in all; ")
     assert warning.endswith("solver.budget is 29,999 steps; solver.budget = 30000 lets it be twice as long")
     tried.clear()
-    settled(replace(system, budget=30_000), run)
+    settle(replace(system, budget=30_000), run)
     assert tried == [2.0, 4.0, 8.0, 16.0]
 
 
 def test_what_does_not_settle_says_which_limit_it_has_met_and_what_would_help() -> None:
-    system = asked(system_of(make(EXACT)))
+    system = to_judge(system_of(make(EXACT)))
     judged = judge(replace(system, duration=0.05))
     open_ = judged._replace(verdict=replace(judged.verdict, decision=UNDECIDED))
-    (warning,) = settled(replace(system, budget=MOST_BUDGET), lambda part: open_).warnings
+    (warning,) = settle(replace(system, budget=MOST_BUDGET), lambda part: open_).warnings
     assert f"no more than {MOST_SAMPLES:,} samples are tried; " in warning
     assert warning.endswith("an output.sample_interval above 0.0001 s lets it be longer")
 
@@ -185,7 +185,7 @@ def test_a_measured_profile_gives_up_at_its_budget_and_goes_on_with_the_one_that
     text = text.replace("output.sample_interval = 1e-4", f'roughness.wheel.profile = "{tmp_path}/runout.csv"')
 
     def with_budget(steps: int) -> Settled[Motion]:
-        return settle(parse_case(text, "case", ["friction.coefficient=0.3", f"solver.budget={steps}"]).case)
+        return settle_case(parse_case(text, "case", ["friction.coefficient=0.3", f"solver.budget={steps}"]).case)
 
     first = with_budget(1)
     (warning,) = first.warnings
@@ -259,7 +259,9 @@ def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
     assert report.findings.warnings == []
     ran = " to ".join(f"{each:.4g}" for each in durations)
     assert report.findings.sentences == [f"all 2 points are decided, in {ran} s"]
-    alone = [settle(parse_case(OPEN, "", [f"friction.coefficient={phi}"]).case).system for phi in (0.3, 0.565)]
+    alone = [
+        settle_case(parse_case(OPEN, "", [f"friction.coefficient={phi}"]).case).system for phi in (0.3, 0.565)
+    ]
     assert durations.tolist() == pytest.approx([each.duration for each in alone])
     assert durations[1] >= 4.0 * durations[0]
     assert {*regimes.tolist()} == {"damped"}
@@ -282,7 +284,7 @@ def test_check_tells_how_long_a_run_may_become_and_a_number_is_not_touched() -> 
     system = system_of(make(EXACT))
     found = check(system)
     assert f"up to {longest(system):.6g} s, or 100,000,000 steps in all" in found.adjustments[0]
-    assert settled(replace(system, budget=0), judge).system.duration == system.duration
+    assert settle(replace(system, budget=0), judge).system.duration == system.duration
 
 
 def test_advice_is_checked_by_a_run_that_settles() -> None:
@@ -295,7 +297,7 @@ def test_advice_is_checked_by_a_run_that_settles() -> None:
 
 def test_a_tolerance_is_kept_by_a_run_that_settles() -> None:
     text = starters()["rough"]
-    found = settle(parse_case(text, "rough").case)
+    found = settle_case(parse_case(text, "rough").case)
     assert found.judged.certificate is not None
     assert found.judged.certificate.certified
     assert found.judged.certificate.certified_until == pytest.approx(found.system.duration)
@@ -368,7 +370,7 @@ def test_amplitudes_that_are_still_on_their_way_are_no_hysteresis(tmp_path: Path
 
 def test_the_pad_of_the_starter_squeals_at_2_khz_as_its_modes_couple() -> None:
     case = parse_case(starters()["pad"], "pad").case
-    found = settle(case)
+    found = settle_case(case)
     report = stability(system_of(case))
     assert report.critical is not None
     assert report.critical.friction == pytest.approx(0.324, abs=5e-4)

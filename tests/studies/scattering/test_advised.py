@@ -9,7 +9,7 @@ from brakecli.case.read import key_path, parse_case, read_text, starters
 from brakecli.case.system import system_of
 from brakecli.studies.runs.advise import advise
 from brakecli.studies.scattering.advised import TOLERANCE, about, squealing, under_tolerance
-from brakecli.studies.scattering.draw import drawn
+from brakecli.studies.scattering.draw import sample_values
 from brakecli.studies.scattering.eigen import answer_of
 from tests.commands import ROOT
 from tests.examples import SQUEAL, make
@@ -30,7 +30,7 @@ def alone(case: Case, values: dict[str, float]) -> bool:
 def test_brakes_about_a_drawing_squeal_as_each_of_them_does(name: str) -> None:
     case = parse_case(starters()[name], name, ["friction.coefficient=0.58"]).case
     study = about(case)
-    values = drawn(study)
+    values = sample_values(study)
     hits = squealing(case)
     assert hits is not None
     assert hits.shape == values.shape[:2]
@@ -43,7 +43,7 @@ def test_brakes_about_a_drawing_squeal_as_each_of_them_does(name: str) -> None:
 
 def test_the_samples_fill_a_tenth_about_the_values_of_the_drawing() -> None:
     case = make(SQUEAL)
-    values = drawn(about(case)).reshape(-1, 4)
+    values = sample_values(about(case)).reshape(-1, 4)
     own = np.array([1e7, 1.2e7, 2e7, case.friction.coefficient])
     part = values / own - 1.0
     assert np.abs(part).max() <= 0.01 * TOLERANCE

@@ -22,7 +22,7 @@ from brakecli.errors import BrakecliError, CaseError, RefusedError, UsageError
 from brakecli.results.read import open_result
 from brakecli.studies.scattering import draw
 from brakecli.studies.scattering.answers import Indices, quantiles
-from brakecli.studies.scattering.draw import MOST_SAMPLES, drawn, for_indices
+from brakecli.studies.scattering.draw import MOST_SAMPLES, for_indices, sample_values
 from brakecli.studies.scattering.study import SCRAMBLINGS, Parameter, Study
 from tests.campaign import campaign, counts
 from tests.commands import ROOT, TINY, left_in
@@ -119,7 +119,7 @@ def test_a_distribution_has_its_mean_and_deviation(tables: dict[str, Any], mean:
 @pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "random"])
 def test_samples_repeat_by_their_seed_and_sets_differ(sampling: str) -> None:
     one, again, other = (
-        drawn(study_of(NORMAL, NORMAL, samples=200, sampling=sampling, seed=s)) for s in (1, 1, 2)
+        sample_values(study_of(NORMAL, NORMAL, samples=200, sampling=sampling, seed=s)) for s in (1, 1, 2)
     )
     assert (one == again).all()
     assert (one != other).any()
@@ -132,7 +132,7 @@ def test_samples_repeat_by_their_seed_and_sets_differ(sampling: str) -> None:
 
 def test_correlations_are_those_of_the_matrix() -> None:
     matrix = [[1.0, 0.8, 0.0], [0.8, 1.0, -0.3], [0.0, -0.3, 1.0]]
-    values = drawn(study_of(NORMAL, NORMAL, NORMAL, samples=1 << 14, correlation=matrix)).reshape(-1, 3)
+    values = sample_values(study_of(NORMAL, NORMAL, NORMAL, samples=1 << 14, correlation=matrix)).reshape(-1, 3)
     assert np.corrcoef(values.T) == pytest.approx(np.array(matrix), abs=0.01)  # 1/√16384, and less for Sobol's
 
 
@@ -214,7 +214,7 @@ def test_intervals_cover_the_truth(sampling: str, margin: float, replications: i
     widths = []
     for seed in range(replications):
         study = study_of(NORMAL, NORMAL, samples=1024, sampling=sampling, seed=seed)
-        found = Probability.of(drawn(study) @ weights < -margin)
+        found = Probability.of(sample_values(study) @ weights < -margin)
         covered += found.lower <= probability <= found.upper
         widths.append(found.upper - found.lower)
     assert covered >= (0.92 if replications >= 400 else 0.85) * replications

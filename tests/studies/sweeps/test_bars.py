@@ -15,9 +15,9 @@ from brakecli.analysis.branches.answers import Answers
 from brakecli.analysis.branches.explore import crossing
 from brakecli.analysis.branches.line import Line
 from brakecli.studies.sweeps.critical import search
-from brakecli.studies.sweeps.read_off import explored
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search
+from brakecli.studies.sweeps.windows_of_branch import explored
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make

@@ -16,10 +16,10 @@ from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.shoe import Shoe
 from brakecli.case.system import system_of
 from brakecli.solver.motion.flow import SmoothFlow
-from brakecli.studies.sweeps.read_off import explored
 from brakecli.studies.sweeps.sustained import _by_runs, sustained
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search
+from brakecli.studies.sweeps.windows_of_branch import explored
 from tests.campaign import campaign
 from tests.examples import SQUEAL, make
 from tests.studies.sweeps.test_critical import found

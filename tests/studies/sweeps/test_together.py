@@ -20,7 +20,7 @@ from brakecli.results.field import values_of
 from brakecli.solver.history import array_history
 from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
-from brakecli.studies.runs.judge import asked, given
+from brakecli.studies.runs.judge import inputs_of, to_judge
 from brakecli.studies.runs.together import TOGETHER, certify_together
 from brakecli.studies.runs.tolerance import certify
 from brakecli.studies.sweeps.plan import LoadedSweep
@@ -86,8 +86,8 @@ def test_what_a_sweep_leaves_out_of_a_verdict_changes_nothing_that_it_keeps(tmp_
         (found,) = certify_together([system])
         assert found is not None
         history = array_history(system.interval, found.motion.rows)
-        asked_of = [given(history, system, None)]
-        (whole,), (brief,) = (classify(asked_of, in_full=full) for full in (True, False))
+        inputs = [inputs_of(history, system, None)]
+        (whole,), (brief,) = (classify(inputs, in_full=full) for full in (True, False))
         one, other = (values_of(kept, {"verdict": verdict}) for verdict in (whole, brief))
         assert one == other
         assert whole.reasons == brief.reasons
@@ -169,7 +169,7 @@ def test_numbers_that_no_brake_has_concern_no_other_point(tmp_path: Path) -> Non
 
 
 def test_a_motion_that_overflows_takes_no_verdict_from_the_others() -> None:
-    systems = [asked(system_of(make(PROMISED, friction__coefficient=each))) for each in (0.2, 0.3, 0.4)]
+    systems = [to_judge(system_of(make(PROMISED, friction__coefficient=each))) for each in (0.2, 0.3, 0.4)]
     certified = certify_together(systems)
     alone = [judged_together([system], [each])[0][0] for system, each in zip(systems, certified, strict=True)]
     assert all(alone)

@@ -27,9 +27,9 @@ from brakecli.solver.method import Method
 from brakecli.solver.period import common_period
 from brakecli.solver.system import Initial
 from brakecli.studies.sweeps.critical import search
-from brakecli.studies.sweeps.read_off import calm, explored, on_waves
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search
+from brakecli.studies.sweeps.windows_of_branch import calm, explored, on_waves
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make

@@ -45,8 +45,8 @@ class ClusterEngine(Engine):
         self._versions = fingerprint()
         self._shared = None
         address = str(getattr(getattr(scheduler, "scheduler", None), "address", scheduler))
-        given, name = ("scheduler", address) if scheduler_file is None else ("scheduler-file", scheduler_file)
-        self._where = f"{argument(given)} {name}"
+        option, name = ("scheduler", address) if scheduler_file is None else ("scheduler-file", scheduler_file)
+        self._where = f"{argument(option)} {name}"
         address = address if scheduler_file is None else self._address_in(scheduler_file)
         self._client = self._connected(address, getattr(scheduler, "security", None))
         with ExitStack() as failed:
@@ -77,8 +77,8 @@ class ClusterEngine(Engine):
         running: dict[Any, Task] = {}
         suspects: deque[Task] = deque()  # last tries that died with a worker which had other tasks, too
         alone = None
-        self._known = self._addresses()
-        looked = seen = time.monotonic()
+        self._reachable = self._addresses()
+        looked = last_sign = time.monotonic()
         while True:
             while len(running) < TASKS_PER_THREAD * self.workers and (task := next_task()) is not None:
                 running[self._submit(task)] = task
@@ -90,13 +90,13 @@ class ClusterEngine(Engine):
                 return
             with self._client.as_current(), suppress(TimeoutError):
                 wait(list(running), timeout=0.5, return_when="FIRST_COMPLETED")
-            for future in [each for each in running if each.done()]:
+            for future in [future for future in running if future.done()]:
                 try:
                     finished = self._collect(future)
                 except TimeoutError:
                     continue
                 task = running.pop(future)
-                seen = time.monotonic()
+                last_sign = time.monotonic()
                 if finished is not None:
                     yield finished
                 elif task.last_try and task is not alone:
@@ -106,8 +106,8 @@ class ClusterEngine(Engine):
             if time.monotonic() - looked > LOOK_SECONDS:
                 yield from self._gone()
                 looked = time.monotonic()
-                seen = looked if self._known else seen
-            if time.monotonic() - seen > WAIT_SECONDS + LOOK_SECONDS:
+                last_sign = looked if self._reachable else last_sign
+            if time.monotonic() - last_sign > WAIT_SECONDS + LOOK_SECONDS:
                 raise BrakecliError(f"{self._where}: has no workers any more{KEPT}")
 
     def _submit(self, task: Task) -> Any:
@@ -136,8 +136,8 @@ class ClusterEngine(Engine):
     def _gone(self) -> Iterator[Finished]:
         """The workers that are no longer there."""
         now = self._addresses()
-        gone = sorted(self._known - now)
-        self._known = now
+        gone = sorted(self._reachable - now)
+        self._reachable = now
         for address in gone:
             yield Finished(None, failure=f"the worker at {address} has gone")
 
@@ -191,8 +191,8 @@ class ClusterEngine(Engine):
     def _compare(self) -> None:
         """Refuse workers of another version: their results would not be the same."""
         with self._explained(UsageError, "a worker cannot load brakecli", INSTALL):
-            found = self._client.run(fingerprint)
-        for worker, theirs in sorted(found.items()):
+            fingerprints = self._client.run(fingerprint)
+        for worker, theirs in sorted(fingerprints.items()):
             if difference := _difference(self._versions, theirs, f"the worker at {worker}"):
                 raise RefusedError(f"{self._where}: {difference}{INSTALL}")
 

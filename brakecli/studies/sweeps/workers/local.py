@@ -99,7 +99,7 @@ class LocalEngine(Engine):
             yield from finished
 
     def _hand_out(self, next_task: NextTask) -> None:
-        for worker in [each for each in self.pool if each.task is None and not each.process.is_alive()]:
+        for worker in [worker for worker in self.pool if worker.task is None and not worker.process.is_alive()]:
             self._remove(worker)  # it has died between two tasks
         idle = [worker for worker in self.pool if worker.task is None]
         while (idle or len(self.pool) < self.workers) and (task := next_task()) is not None:

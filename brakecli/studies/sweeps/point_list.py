@@ -43,12 +43,12 @@ class Listed:
     @classmethod
     def of(cls, keys: Sequence[str], columns: Iterable[Iterable[Any]], lines: tuple[int, ...] = ()) -> "Listed":
         """The points whose values stand in the columns of these keys."""
-        found = tuple(tuple(each) for each in columns)
+        values = tuple(tuple(column) for column in columns)
         checksum = 0
-        for column in found:
+        for column in values:
             for begin in range(0, len(column), _AT_ONCE):
                 checksum = zlib.crc32(repr(column[begin : begin + _AT_ONCE]).encode(), checksum)
-        return cls(tuple(keys), found, checksum, lines)
+        return cls(tuple(keys), values, checksum, lines)
 
     @property
     def size(self) -> int:

@@ -9,10 +9,10 @@ import pytest
 import brakecli
 from brakecli.errors import BrakecliError, CaseError, RefusedError
 from brakecli.results.read import open_result
-from brakecli.studies.sweeps import listed as listed_points
+from brakecli.studies.sweeps import point_list
 from brakecli.studies.sweeps.journal import identity
-from brakecli.studies.sweeps.listed import read_listed
 from brakecli.studies.sweeps.plan import LoadedSweep
+from brakecli.studies.sweeps.point_list import read_listed
 from brakecli.studies.sweeps.workers.task import compute_units
 from tests.campaign import campaign
 from tests.commands import brakecli as command
@@ -172,13 +172,13 @@ def test_wrong_points_from_python(tmp_path: Path, points: Any, said: str) -> Non
 def noted(monkeypatch: pytest.MonkeyPatch, name: str) -> list[str]:
     """The texts that a function of the module is called with from now on."""
     texts = list[str]()
-    before = getattr(listed_points, name)
+    before = getattr(point_list, name)
 
     def called(text: str) -> Any:
         texts.append(text)
         return before(text)
 
-    monkeypatch.setattr(listed_points, name, called)
+    monkeypatch.setattr(point_list, name, called)
     return texts
 
 
@@ -188,7 +188,7 @@ def test_a_table_of_too_many_keys_or_points_is_refused_while_it_is_read(
     """No more lines are read than it takes to know that, and no more keys are parsed than a line holds."""
     parsed = noted(monkeypatch, "key_path")
     values = noted(monkeypatch, "_value")
-    monkeypatch.setattr(listed_points, "MOST_VALUES", 1000)
+    monkeypatch.setattr(point_list, "MOST_VALUES", 1000)
     keys = [f"a.b{number}" for number in range(3000)]
     for plan, said in (
         (f"{','.join(keys)}\n{','.join('1' * 3000)}\n", r"plan\.csv:1: 3000 keys are too many, 200 are the most"),
@@ -213,7 +213,7 @@ def test_each_key_of_a_table_is_parsed_once(tmp_path: Path, monkeypatch: pytest.
 
 
 def test_a_line_without_end_is_no_row(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(listed_points, "LONGEST_LINE", 1000)
+    monkeypatch.setattr(point_list, "LONGEST_LINE", 1000)
     with pytest.raises(CaseError, match=r"plan\.csv:2: has 501 entries for 1 keys"):
         listed(tmp_path, "shoe.mass\n" + "1," * 100_000)
     with pytest.raises(CaseError, match=r"points: cannot be read .*null byte"):

@@ -96,7 +96,7 @@ def without_dashpots(critical: Critical, answers: Answers) -> Search:
 
     No branch leads through a resonance then, and a large motion beside may hide what full contact does.
     """
-    known = pieces(answers)
+    parts = pieces(answers)
     line = answers.line
 
     @cache
@@ -104,18 +104,18 @@ def without_dashpots(critical: Critical, answers: Answers) -> Search:
         theory = in_full_contact(line.system(line.place(value)))
         if theory is not None:
             return theory.mode.growth > theory.known_to
-        return next((piece.unstable for piece in known if piece.low <= value <= piece.high), None)
+        return next((piece.unstable for piece in parts if piece.low <= value <= piece.high), None)
 
     def widened(change: Change) -> Change:
         near = change.error + math.ulp(change.value)
         bounds = [bound for window in answers.windows for bound in window]
-        bars = [each.bar for each in bounds if change.known and abs(line.value(each.p) - change.value) <= near]
+        bars = [bound.bar for bound in bounds if change.known and abs(line.value(bound.p) - change.value) <= near]
         return change._replace(error=change.error + (line.high - line.low) * max(bars, default=0.0))
 
-    middles = {0.5 * (piece.low + piece.high) for piece in known}
+    middles = {0.5 * (piece.low + piece.high) for piece in parts}
     values = sorted({*np.linspace(line.low, line.high, VALUES).tolist(), *middles})
-    found = between_known(unstable, values, PART * critical.tolerance)
-    return of_changes(critical, unstable(values[0]), map(widened, found))
+    changes = between_known(unstable, values, PART * critical.tolerance)
+    return of_changes(critical, unstable(values[0]), map(widened, changes))
 
 
 def calm(answers: Answers, value: float) -> list[Array]:
@@ -127,7 +127,7 @@ def calm(answers: Answers, value: float) -> list[Array]:
 
 def pieces(answers: Answers) -> list[Piece]:
     """The range in parts: stable, unstable, or not known. Where nothing slides steadily it counts as unstable."""
-    found = list[tuple[float, float, bool | None]]()
+    stretches = list[tuple[float, float, bool | None]]()
     last = 0.0
     slides = [slide.p for slide in answers.explored.slides if slide.signs is not None]
     ends = (slides[0], slides[-1]) if slides else (1.0, 0.0)
@@ -136,21 +136,21 @@ def pieces(answers: Answers) -> list[Piece]:
     for low, high, unstable in [*sorted(spans), (1.0, 1.0, None)]:
         cuts = sorted({last, low, *(end for end in ends if last < end < low)})
         for a, b in pairwise(cuts):
-            found.append((a, b, None if ends[0] <= 0.5 * (a + b) <= ends[1] else True))
+            stretches.append((a, b, None if ends[0] <= 0.5 * (a + b) <= ends[1] else True))
         if high > low:
-            found.append((low, high, unstable))
+            stretches.append((low, high, unstable))
         last = max(last, high)
     value = answers.line.value
-    return [Piece(value(low), value(high), unstable) for low, high, unstable in found]
+    return [Piece(value(low), value(high), unstable) for low, high, unstable in stretches]
 
 
 def _adapted(system: System) -> System:
     """The system at the speed and load of its start throughout; without dashpots it gets very light ones."""
     belt = schedule((0.0,), (system.belt_speed / system.radius,), system.radius)
-    held = replace(system, belt=belt, load=schedule((0.0,), (system.load_at_start,)))
+    steady = replace(system, belt=belt, load=schedule((0.0,), (system.load_at_start,)))
     c = system.coefficients
     if not is_undamped(c):
-        return held
+        return steady
     slow, fast = natural_frequencies(c, system.contact_stiffness)
     damping = 2.0 * LIGHT * 2.0 * math.pi * (slow or fast) * c.m
-    return replace(held, coefficients=c._replace(b_xx=damping, b_yy=damping))
+    return replace(steady, coefficients=c._replace(b_xx=damping, b_yy=damping))
