@@ -129,7 +129,7 @@ def compare(coarse: Motion, fine: Motion) -> Apart:
 
     Components below rounding, such as the velocity of a resting shoe, are ignored.
     """
-    system = max(coarse.system, fine.system, key=lambda motion: motion.interval)
+    system = max(coarse.system, fine.system, key=lambda system: system.interval)
     every = (round(system.interval / motion.system.interval) for motion in (coarse, fine))
     one, other = (
         np.ascontiguousarray(motion.rows[::n, :4].T) for motion, n in zip((coarse, fine), every, strict=True)
