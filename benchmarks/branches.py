@@ -14,8 +14,8 @@ import numpy as np
 
 from brakecli.analysis.branches.explore import Explorer
 from brakecli.analysis.branches.line import Line
+from brakecli.analysis.branches.rows import LIMIT_CYCLE
 from brakecli.analysis.branches.sliding import Sliding
-from brakecli.analysis.branches.told import LIMIT_CYCLE
 from tests.analysis.shoes import Shoe, random_shoes
 from tests.examples import make
 

@@ -11,18 +11,18 @@ from brakecli.analysis.branches.explore import Explored, crossing, span
 from brakecli.analysis.branches.follow import RUNS_AGAIN
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.point import End, Point
+from brakecli.analysis.branches.rows import FORCED, SLIDING, Followed, Mark
 from brakecli.analysis.branches.sliding import Slide, stable_spans
 from brakecli.analysis.branches.stable_parts import (
     CUT,
     NARROWEST,
     Part,
     Span,
-    merged,
+    merge,
+    separate,
     stable_parts,
-    told_apart,
-    united,
+    unite,
 )
-from brakecli.analysis.branches.told import FORCED, SLIDING, Followed, Mark
 
 MEET = 1e-3
 """Part of the range, and of their states, by which two ends of branches differ at most that are one motion."""
@@ -66,20 +66,20 @@ class Answers:
     @cached_property
     def bases(self) -> list[Followed]:
         """The forced motions that grow with the waves out of steady sliding; none where nothing forces any."""
-        return [each for each in self.branches if each.kind == FORCED and not each.note]
+        return [branch for branch in self.branches if branch.kind == FORCED and not branch.note]
 
     @cached_property
-    def known(self) -> list[Span]:
+    def domain(self) -> list[Span]:
         """Where the motion is known that continues steady sliding."""
         if self.bases:
-            return merged([*map(span, self.bases), *self._bridges])
+            return merge([*map(span, self.bases), *self._bridges])
         slides = self._slides
         return [(slides[0].p, slides[-1].p)] if slides else []
 
     @property
     def range(self) -> Span | None:
         """From the first place to the last one at which that motion is known; None where there is none."""
-        return (self.known[0][0], self.known[-1][1]) if self.known else None
+        return (self.domain[0][0], self.domain[-1][1]) if self.domain else None
 
     @property
     def _slides(self) -> list[Slide]:
@@ -92,21 +92,25 @@ class Answers:
 
         The ends are not known of one in which a branch is lost: it may come back as a stable motion.
         """
-        found = list[tuple[Bound, Bound]]()
-        for (first, last), within in zip(self.known, self._edges, strict=True):
+        windows = list[tuple[Bound, Bound]]()
+        for (first, last), within in zip(self.domain, self._edges, strict=True):
             edges = [Bound(first), *within, Bound(last)]
             for low, high in zip(edges[::2], edges[1::2], strict=True):
                 if high.p > low.p + NARROWEST:
                     lost = any(low.p - low.error < p < high.p + high.error for p in self._lost_at)
                     ends = (low._replace(known=False), high._replace(known=False)) if lost else (low, high)
-                    found.append(ends)
-        return found
+                    windows.append(ends)
+        return windows
 
     @cached_property
     def _cut_ends(self) -> list[tuple[End, Point]]:
         """The ends at which branches of the motion that continues steady sliding are cut."""
-        found = [each.branch for each in self.bases if each.branch and each.branch.points]
-        ends = [pair for each in found for pair in zip(each.ended, (each.points[0], each.points[-1]), strict=True)]
+        branches = [followed.branch for followed in self.bases if followed.branch and followed.branch.points]
+        ends = [
+            pair
+            for branch in branches
+            for pair in zip(branch.ended, (branch.points[0], branch.points[-1]), strict=True)
+        ]
         return [(end, point) for end, point in ends if end.kind in CUT]
 
     @cached_property
@@ -153,7 +157,7 @@ class Answers:
     def _stable(self) -> list[Part]:
         """Where the motion that continues steady sliding is stable; a forced one on one of its sheets."""
         if self.bases:
-            return united([part for each in self.bases for part in stable_parts(each)])
+            return unite([piece for forced in self.bases for piece in stable_parts(forced)])
         spans = stable_spans(self.explored.slides, self.explored.changes)
         return [
             Part(Bound(low, error=low_error), Bound(high, error=high_error), 0.0)
@@ -163,11 +167,11 @@ class Answers:
     @cached_property
     def _edges(self) -> list[list[Bound]]:
         """Both ends of all stable parts in order, for each interval in which the motion is known."""
-        found = []
-        for first, last in self.known:
-            own = [part for part in self._stable if first <= part.low.p <= last]
-            found.append(told_apart([bound for part in own for bound in (part.low, part.high)]))
-        return found
+        edges = []
+        for first, last in self.domain:
+            own = [piece for piece in self._stable if first <= piece.low.p <= last]
+            edges.append(separate([bound for piece in own for bound in (piece.low, piece.high)]))
+        return edges
 
     @cached_property
     def stable_spans(self) -> list[Span]:
@@ -177,17 +181,17 @@ class Answers:
     @cached_property
     def coexisting(self) -> list[tuple[float, float, float]]:
         """Intervals with a stable vibration beside stable sliding, and its frequency (Hz) at the lower end."""
-        found = []
+        spans = []
         for followed in self.branches:
             if followed.kind == SLIDING or followed in self.bases:
                 continue
-            for part in stable_parts(followed):
+            for piece in stable_parts(followed):
                 for begin, end in self.stable_spans:
-                    left = max(part.low.p, begin)
-                    right = min(part.high.p, end)
-                    if right > left + NARROWEST:
-                        found.append((left, right, part.frequency))
-        return sorted(found)
+                    low = max(piece.low.p, begin)
+                    high = min(piece.high.p, end)
+                    if high > low + NARROWEST:
+                        spans.append((low, high, piece.frequency))
+        return sorted(spans)
 
     @property
     def coexists_from(self) -> float | None:
@@ -202,21 +206,21 @@ class Answers:
         p = self.line.place(self.own)
         if not any(low <= p <= high for low, high in self.stable_spans):
             return None
-        found = [
+        amplitudes = [
             point.facts.amplitude
             for followed in self.branches
             if followed.kind != SLIDING
             for point in crossing(followed, p)
             if not point.stable
         ]
-        return min(found, default=None)
+        return min(amplitudes, default=None)
 
     @property
     def cut(self) -> list[Mark]:
         """The ends of branches that do not reach an end of the range, or steady sliding, or themselves."""
-        known = ("it reaches", "it is closed")
+        complete = ("it reaches", "it is closed")
         marks = [mark for followed in self.branches[1:] for mark in followed.ended]
-        return [mark for mark in marks if not mark.reason.startswith(known)]
+        return [mark for mark in marks if not mark.reason.startswith(complete)]
 
     @cached_property
     def sentence(self) -> str:
@@ -235,7 +239,7 @@ class Answers:
         search = self.explored.search
         if not search.pushes:
             return ""
-        lowest = [min(part.low.p for part in stable_parts(followed)) for followed in search.found]
+        lowest = [min(piece.low.p for piece in stable_parts(followed)) for followed in search.found]
         values = " and ".join(f"{self.line.value(p):.4g}" for p in sorted(lowest))
         how = f"found in {search.pushes} pushes"
         if len(lowest) == 0:
@@ -272,7 +276,7 @@ class Answers:
 
     def _beside_sliding(self) -> list[str]:
         if not self.coexisting:
-            followed = any(each.kind != SLIDING for each in self.branches)
+            followed = any(branch.kind != SLIDING for branch in self.branches)
             return [] if followed or self.range is None or self.explored.notes else [NONE_BEGINS]
         low, _, frequency = self.coexisting[0]
         until = max(end for _, end, _ in self.coexisting)

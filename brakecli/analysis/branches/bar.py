@@ -45,7 +45,7 @@ class Bound(NamedTuple):
         finer = self.problem.finer(FINER) if self.inner is not None else []
         if not finer:
             return self.error
-        moved = [self._moved(each) for each in finer]
+        moved = [self._moved(problem) for problem in finer]
         return max(self.error, KNOWN) + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
 
     def _moved(self, finer: Any) -> float | None:
@@ -53,20 +53,22 @@ class Bound(NamedTuple):
         if self.inner is None or self.beyond is None:
             return None
         newton = Newton(finer, Settings())
-        one, other = sorted((self.inner, self.beyond), key=lambda each: each.s)
+        one, other = sorted((self.inner, self.beyond), key=lambda point: point.s)
         finer.use(one.chart)
         for apart in STRIDES:
             ends = [
-                newton.solved(each.z + way * each.tangent, each.tangent, each.tangent, each.s + way, exact=True)
-                for each, way in ((one, -apart), (other, apart))
+                newton.solved(
+                    point.z + way * point.tangent, point.tangent, point.tangent, point.s + way, exact=True
+                )
+                for point, way in ((one, -apart), (other, apart))
             ]
             if ends[0] is not None and ends[1] is not None and ends[0].stable is not ends[1].stable:
                 return located(newton, ends[0], ends[1])
         first = newton.solved(self.inner.z, self.inner.tangent, self.inner.tangent, 0.0, exact=True)
         points = both_ways(finer, first, AROUND).points if first is not None else []
-        pairs = [each for each in pairwise(points) if each[0].stable is not each[1].stable]
-        found = [located(newton, *each) for each in pairs if each[0].chart is each[1].chart]
-        return min(found, key=lambda p: abs(p - self.p), default=None)
+        pairs = [pair for pair in pairwise(points) if pair[0].stable is not pair[1].stable]
+        places = [located(newton, *pair) for pair in pairs if pair[0].chart is pair[1].chart]
+        return min(places, key=lambda p: abs(p - self.p), default=None)
 
 
 def located(newton: Newton, one: Point, other: Point) -> float:
@@ -80,8 +82,8 @@ def located(newton: Newton, one: Point, other: Point) -> float:
     p = one.p
     side = 0
     for turn in range(ROUNDS):
-        part = 0.5 if turn % 2 else zero(low, high)
-        middle = newton.between(one, other, part) or newton.between(one, other, 0.5)
+        fraction = 0.5 if turn % 2 else zero(low, high)
+        middle = newton.between(one, other, fraction) or newton.between(one, other, 0.5)
         if middle is None:
             break
         moved = abs(middle.p - p)

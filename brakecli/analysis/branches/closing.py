@@ -100,22 +100,22 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
             break
         one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)
     nearest = min((one, other), key=lambda point: abs(ahead(point)))
-    place = nearest.z
+    guess = nearest.z
     onward = nearest.tangent
     chart = new.chart
     if foreign:
-        guess = newton.problem.carried(nearest, first.chart)
-        if guess is None:
+        in_chart = newton.problem.carried(nearest, first.chart)
+        if in_chart is None:
             return None, None
-        place = np.append(guess[0], nearest.p)
-        onward = guess[1]
+        guess = np.append(in_chart[0], nearest.p)
+        onward = in_chart[1]
         chart = first.chart
     newton.problem.use(chart)
-    place = place - first.tangent * ((place - first.z) @ first.tangent)
-    crossing = newton.solved(place, first.tangent, onward, nearest.s, exact=True)
+    guess = guess - first.tangent * ((guess - first.z) @ first.tangent)
+    crossing = newton.solved(guess, first.tangent, onward, nearest.s, exact=True)
     if crossing is None or crossing.word != first.word:
         return None, None
-    if float(np.abs(crossing.z - place).max()) > (CARRIED if foreign else SAME_PLACE):
+    if float(np.abs(crossing.z - guess).max()) > (CARRIED if foreign else SAME_PLACE):
         return None, None
     if float(np.abs(crossing.z - first.z).max()) > SAME_PLACE:
         return None, None

@@ -23,23 +23,23 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
     two directions stays on the other side.
     """
     for reach in REACHES:
-        place = here.z + reach * here.tangent
+        beside = here.z + reach * here.tangent
         for _ in range(2):  # the second time, from a place on the tangent of the other side
-            seen = newton.evaluate(place, True)
-            if seen is None or seen.by_p is None or seen.word == here.word:
+            evaluation = newton.evaluate(beside, True)
+            if evaluation is None or evaluation.by_p is None or evaluation.word == here.word:
                 break
-            rows = np.column_stack([seen.by_u, seen.by_p])
+            rows = np.column_stack([evaluation.by_u, evaluation.by_p])
             if not np.isfinite(rows).all():
                 break
             onward = np.linalg.svd(rows)[2][-1]
-            for length in (part * reach for part in TRIED):
+            for length in (times * reach for times in TRIED):
                 for way in (onward, -onward):
                     # Newton's method begins beyond the border: from this side it would find this side again
-                    guess = place + (length - (place - here.z) @ way) * way
+                    guess = beside + (length - (beside - here.z) @ way) * way
                     new = newton.solved(guess, way, way, 0.0)
-                    if new is None or new.word != seen.word:
+                    if new is None or new.word != evaluation.word:
                         new = newton.solved(here.z + length * way, way, way, 0.0)
-                    if new is None or new.word != seen.word or not newton.holds(new):
+                    if new is None or new.word != evaluation.word or not newton.holds(new):
                         continue
                     chord = new.z - here.z
                     distance = math.sqrt(chord @ chord)
@@ -47,8 +47,8 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
                     led = led_on(newton, here, new, length) if distance < FAR * length + reach else None
                     if led is not None:
                         return led
-            place = here.z + reach * onward
-        newton.seen = seen
+            beside = here.z + reach * onward
+        newton.last = evaluation
     return None
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from brakecli.analysis.branches.extent import Extent, extent
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.point import Point
-from brakecli.analysis.branches.problem import Array, Guess, Problem, Seen, steps_in_p
+from brakecli.analysis.branches.problem import Array, Evaluation, Guess, Problem, steps_in_p
 from brakecli.errors import CaseError
 from brakecli.solver.motion.events import DONE, EVENTFUL, GRAZED
 from brakecli.solver.motion.flow import Orbit, SmoothFlow
@@ -78,9 +78,9 @@ class Flow(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Chart:
-    """How unknowns are to be read: the plane through `place` across `normal`, scales, time (s), size (m)."""
+    """How unknowns are to be read: the plane through `anchor` across `normal`, scales, time (s), size (m)."""
 
-    place: Array
+    anchor: Array
     normal: Array
     scales: Array
     time: float
@@ -104,7 +104,7 @@ class Cycles(Problem):
         self.line = line
         self.periods = periods
         self.flow = lru_cache(maxsize=16)(self._flow)
-        self.rest = lru_cache(maxsize=64)(self._rest)
+        self.equilibrium = lru_cache(maxsize=64)(self._equilibrium)
 
     def of_periods(self, periods: int) -> "Cycles":
         """The problem of motions that repeat after so many periods."""
@@ -114,7 +114,7 @@ class Cycles(Problem):
         shoe = self.line.shoe(p)
         return SmoothFlow(*shoe)
 
-    def _rest(self, p: float) -> Array:
+    def _equilibrium(self, p: float) -> Array:
         """Steady sliding, from which states count."""
         x, y = self.line.shoe(p).rest or (math.nan, math.nan)
         return np.array([x, y, 0.0, 0.0])
@@ -130,27 +130,27 @@ class Cycles(Problem):
             return "the period vanishes, or grows without bound"
         try:
             flow = self.flow(p)
-            rest = self.rest(p)
+            equilibrium = self.equilibrium(p)
         except CaseError as error:
             return str(error)
-        how = self._over_period(flow, rest + u[:4] * chart.scales, periods, chart, derivative)
+        how = self._over_period(flow, equilibrium + u[:4] * chart.scales, periods, chart, derivative)
         if how == DONE:
             return flow
         return {GRAZED: "an event is grazed", EVENTFUL: "there are too many events in a period"}.get(
             how, "the period grows without bound"
         )
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         """Carry the state over the period; the gap, its derivatives and M across the flow."""
         chart = self.chart
         flow = self._flown(u, p, self.chart)
         if isinstance(flow, str):
             return flow
-        rest = self.rest(p)
+        equilibrium = self.equilibrium(p)
         path = flow.path
         scales = chart.scales
         matrix = flow.derivative * scales / scales[:, None]
-        end = (flow.state - rest) / scales
+        end = (flow.state - equilibrium) / scales
         speed = path.velocity / scales
         by_u = np.zeros((5, 5))
         gap = np.empty(5)
@@ -159,7 +159,7 @@ class Cycles(Problem):
         by_u[4, :4] = chart.normal
         by_u.ravel()[0:24:6] -= 1.0
         gap[:4] = end - u[:4]
-        gap[4] = chart.normal @ (u[:4] - chart.place)
+        gap[4] = chart.normal @ (u[:4] - chart.anchor)
         across = float(chart.normal @ speed)
         if across == 0.0:
             return "the flow runs along its plane"
@@ -173,7 +173,7 @@ class Cycles(Problem):
             0.5 * float(path.high[0] - path.low[0]),
             float(spent[STICK]) / period,
             float(spent[OPEN]) / period,
-            tuple((rest + u[:4] * scales).tolist()),
+            tuple((equilibrium + u[:4] * scales).tolist()),
             word,
             flow.times,
         )
@@ -181,7 +181,7 @@ class Cycles(Problem):
         by_p = self._by_p(u, p, end, word) if with_parameter else None
         if with_parameter and by_p is None:
             return "the derivative by the parameter meets a border, or the end of what is valid"
-        return Seen(gap, by_u, by_p, (chart.basis.T @ on_plane)[None], cyclic(word), facts, margins)
+        return Evaluation(gap, by_u, by_p, (chart.basis.T @ on_plane)[None], cyclic(word), facts, margins)
 
     def extent(self, point: Point) -> Extent:
         """How far the motion of a point reaches, and where it is in the mean."""
@@ -203,7 +203,7 @@ class Cycles(Problem):
             flow = self._flown(u, p + step, self.chart, derivative=False)
             if isinstance(flow, str) or flow.word != word:
                 continue
-            sides[step] = (flow.state - self.rest(p + step)) / self.chart.scales
+            sides[step] = (flow.state - self.equilibrium(p + step)) / self.chart.scales
             if -step in sides:
                 return np.append((sides[abs(step)] - sides[-abs(step)]) / (2.0 * abs(step)), 0.0)
         for step, there in sides.items():
@@ -212,15 +212,15 @@ class Cycles(Problem):
 
     def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
         """How far a cycle in slip alone is from stick, and one that does not fly from flight, of order one."""
-        found = []
+        margins = []
         belt = self.line.shoe(p).belt
         sliding = BACKWARD if belt > 0.0 else FORWARD
         if not set(word) - {sliding, OPEN}:
             fastest = high[2] if sliding == BACKWARD else low[2]
-            found.append(1.0 - float(fastest) / belt)
+            margins.append(1.0 - float(fastest) / belt)
         if OPEN not in word:
-            found.append(float(high[1]) / float(self.rest(p)[1]))
-        return tuple(found)
+            margins.append(float(high[1]) / float(self.equilibrium(p)[1]))
+        return tuple(margins)
 
     def chart_at(self, u: Array, p: float, scales: Array, time: float, size: float) -> Chart | None:
         """A chart whose plane lies across the flow at a place; None where nothing moves there."""
@@ -236,7 +236,7 @@ class Cycles(Problem):
     def _along(self, u: Array, p: float, scales: Array, time: float) -> Array | None:
         """The direction of the flow at a place, of length one; None where nothing moves there."""
         flow = self.flow(p)
-        flow(self.rest(p) + u[:4] * scales, BEGUN * time, False)
+        flow(self.equilibrium(p) + u[:4] * scales, BEGUN * time, False)
         speed = flow.path.start / scales
         length = math.sqrt(speed @ speed)
         return speed / length if length > 0.0 else None
@@ -276,37 +276,37 @@ class Cycles(Problem):
     def _moved(self, z: Array, chart: Chart, ahead: float, scales: Array, time: float) -> Array | None:
         """A point of a chart, carried ahead (s) by the flow, in other scales."""
         p = min(max(float(z[5]), 0.0), 1.0)
-        state = self.rest(p) + z[:4] * chart.scales
+        state = self.equilibrium(p) + z[:4] * chart.scales
         if ahead > 0.0:
             flow = self.flow(p)
             if flow(state, ahead, False) != DONE:
                 return None
             state = flow.state
-        return np.append((state - self.rest(p)) / scales, z[4] * chart.time / time)
+        return np.append((state - self.equilibrium(p)) / scales, z[4] * chart.time / time)
 
     def carried(self, point: Point, chart: Chart) -> Guess | None:
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
         cycle = point.facts
         flow = self.flow(point.p)
-        rest = self.rest(point.p)
+        equilibrium = self.equilibrium(point.p)
         state = np.array(cycle.state)
         best = (math.inf, 0.0)
-        for part in np.linspace(0.0, 1.0, LOOKED + 1)[:-1]:
-            if flow(state, max(part, INSTANT) * cycle.period, False) != DONE:
+        for fraction in np.linspace(0.0, 1.0, LOOKED + 1)[:-1]:
+            if flow(state, max(fraction, INSTANT) * cycle.period, False) != DONE:
                 return None
-            off = (flow.state - rest) / chart.scales - chart.place
-            best = min(best, (float(off @ off), float(part)))
+            off = (flow.state - equilibrium) / chart.scales - chart.anchor
+            best = min(best, (float(off @ off), float(fraction)))
         ahead = best[1] * cycle.period
         for _ in range(CORRECTED):  # Newton's method for the time at which the plane is passed
             if flow(state, max(ahead % cycle.period, INSTANT * cycle.period), False) != DONE:
                 return None
-            off = (flow.state - rest) / chart.scales - chart.place
+            off = (flow.state - equilibrium) / chart.scales - chart.anchor
             speed = flow.path.velocity / chart.scales
             ahead -= float(chart.normal @ off) / float(chart.normal @ speed)
         ahead %= cycle.period
         if flow(state, max(ahead, INSTANT * cycle.period), False) != DONE:
             return None
-        u = np.append((flow.state - rest) / chart.scales, cycle.period / chart.time)
+        u = np.append((flow.state - equilibrium) / chart.scales, cycle.period / chart.time)
         beside = self._moved(point.z + SHIFT * point.tangent, point.chart, ahead, chart.scales, chart.time)
         if beside is None:
             return None

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.branches.begin import settled
 from brakecli.analysis.branches.cycles import Cycles
 from brakecli.analysis.branches.follow import Stop, both_ways, follow
 from brakecli.analysis.branches.forced import MOST_PERIODS, Forced
-from brakecli.analysis.branches.islands import PARTS, Search, places, tried
+from brakecli.analysis.branches.islands import PARTS, Search, places, try_pushes
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.newton import LEFT, OFF, Newton, Settings
 from brakecli.analysis.branches.point import Point, cubic
 from brakecli.analysis.branches.problem import Array, Problem
 from brakecli.analysis.branches.rough_cycles import RoughCycles
+from brakecli.analysis.branches.rows import FORCED, IN_SLIDING, LIMIT_CYCLE, Followed, Mark, of_branch, of_sliding
 from brakecli.analysis.branches.sliding import Change, Slide, Sliding
+from brakecli.analysis.branches.starts import settle
 from brakecli.analysis.branches.switch import switch
-from brakecli.analysis.branches.told import FORCED, IN_SLIDING, LIMIT_CYCLE, Followed, Mark, slid, told_of
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
@@ -110,7 +110,7 @@ class Explorer:
 
         On smooth pads vibrations beside these are sought by five times so many `pushes`.
         """
-        self.branches.append(slid(self.sliding, self.slides, self.changes))
+        self.branches.append(of_sliding(self.sliding, self.slides, self.changes))
         if not self.branches[0].points:
             self.notes.insert(0, "there is no steady sliding in the range")
         if self.line.case.roughness.wheel is not None:
@@ -160,20 +160,20 @@ class Explorer:
         """Follow the branch of a motion along its tangent, or both ways if it lies `within` it."""
         how = self._settings(), self._until(problem, first), self.stop
         branch = both_ways(problem, first, *how) if within else follow(problem, first, None, *how)
-        self.branches.append(replace(told_of(self.line, branch, problem, kind, change, changes), note=note))
+        self.branches.append(replace(of_branch(self.line, branch, problem, kind, change, changes), note=note))
         for other in branch.aside:
             if not (self._over() or any(passes(followed, other) for followed in self.branches)):
                 self._follow(problem, other, kind, note, within=True)
 
     def _settings(self) -> Settings:
-        left = max(self.end - perf_counter(), 0.0)
-        return Settings(longest=LONGEST, points=min(POINTS, max(self.points - self.count, 0)), seconds=left)
+        seconds = max(self.end - perf_counter(), 0.0)
+        return Settings(longest=LONGEST, points=min(POINTS, max(self.points - self.count, 0)), seconds=seconds)
 
     def _until(self, problem: Problem, first: Point) -> Callable[[Point], str | None]:
         """Ends a branch that has come back to steady sliding, or grown beyond all bounds."""
         begun = first.facts.amplitude
         smooth = self.line.smooth
-        left = [False]
+        away = [False]
         cycles = isinstance(problem, Cycles)
 
         def until(point: Point) -> str | None:
@@ -182,10 +182,10 @@ class Explorer:
             amplitude = point.facts.amplitude
             if cycles:
                 slips = len(set(point.facts.word)) == 1
-                if left[0] and slips and (smooth or amplitude < SMALLEST * begun):
+                if away[0] and slips and (smooth or amplitude < SMALLEST * begun):
                     return IN_SLIDING
                 # on smooth pads slip alone is linear; a rough shoe slips in larger cycles, too
-                left[0] |= not slips or (amplitude > begun and not smooth)
+                away[0] |= not slips or (amplitude > begun and not smooth)
             return LARGE if cycles and amplitude > LARGEST * begun else None  # waves may begin at nothing
 
         return until
@@ -215,7 +215,7 @@ class Explorer:
         try:
             return Forced.along(self.line)
         except CaseError as error:
-            self.notes.append("; ".join(f"{each.what}; {each.remedy}" for each in error.problems))
+            self.notes.append("; ".join(f"{problem.what}; {problem.remedy}" for problem in error.problems))
             return None
 
     def _forced(self) -> None:
@@ -235,15 +235,15 @@ class Explorer:
     def _forced_from(self, problem: Forced, p: float, state: Any) -> None:
         """The branch of the forced motion that a run comes to; none where it is known already."""
         value = self.line.value(p)
-        found = None if self._over() else problem.settled(p, state)
-        if found is None:
+        motion = None if self._over() else problem.settled(p, state)
+        if motion is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no periodic motion")
-        elif self._known(found[1]):
+        elif self._is_followed(motion[1]):
             self.notes.append(f"the motion given for {value:.6g} comes to one of a branch that is known")
         else:
-            self._follow(*found, FORCED, f"from the motion given for {value:.6g}", within=True)
+            self._follow(*motion, FORCED, f"from the motion given for {value:.6g}", within=True)
 
-    def _known(self, first: Point) -> bool:
+    def _is_followed(self, first: Point) -> bool:
         """Whether a motion lies on a branch that has been followed, perhaps as several of its periods."""
         return any(lies_on(followed, first) for followed in self.branches)
 
@@ -256,11 +256,11 @@ class Explorer:
             frequency = (least_stable or float(np.abs(values.imag).max())) / (2.0 * math.pi)
         value = self.line.value(p)
         problem = self._problem()
-        first = settled(problem, p, state, frequency) if frequency else None
+        first = settle(problem, p, state, frequency) if frequency else None
         if first is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no limit cycle")
             return
-        if self._known(first):
+        if self._is_followed(first):
             self.notes.append(f"the motion given for {value:.6g} comes to a cycle of a branch from flutter")
             return
         self._follow(problem, first, note=f"from the motion given for {value:.6g}", within=True)
@@ -276,7 +276,7 @@ class Explorer:
             if self.stop() or perf_counter() > self.end:
                 break
             self.tell("pushes", first, PARTS * pushes)
-            ends = tried(self.line.shoe(p), first, count, self.stop)
+            ends = try_pushes(self.line.shoe(p), first, count, self.stop)
             search.pushes += ends.pushes
             search.undecided += ends.undecided
             for orbit in ends.orbits:
@@ -288,8 +288,8 @@ class Explorer:
         """The branch of the cycle that a push has come to, among so many; none where it is known already."""
         value = self.line.value(p)
         problem = self._problem()
-        first = settled(problem, p, state, math.nan)
-        if first is not None and self._known(first):
+        first = settle(problem, p, state, math.nan)
+        if first is not None and self._is_followed(first):
             return
         if first is None or self._over() or len(self.branches) >= most:
             self.notes.append(f"a vibration that a push at {value:.4g} comes to was not followed")
@@ -361,11 +361,11 @@ def passes(followed: Followed, motion: Point) -> bool:
         behind = chord @ (other.z - motion.z)
         if ahead < 0.0 or behind < 0.0 or length == 0.0:
             continue
-        part = _across(one, other, motion, chord)
-        if np.linalg.norm(cubic(one, other, part) - motion.z) > LEFT * length + OFF:
+        fraction = _across(one, other, motion, chord)
+        if np.linalg.norm(cubic(one, other, fraction) - motion.z) > LEFT * length + OFF:
             continue
         followed.problem.use(one.chart)
-        point = newton.between(one, other, part)
+        point = newton.between(one, other, fraction)
         if point is not None and np.linalg.norm(point.z - motion.z) < SAME:
             return True
     return False
@@ -373,15 +373,15 @@ def passes(followed: Followed, motion: Point) -> bool:
 
 def _across(one: Point, other: Point, motion: Point, chord: Array) -> float:
     """The part of the way between two neighbours at which their cubic is level with a motion."""
-    part, _ = bisect(lambda t: bool(chord @ (cubic(one, other, t) - motion.z) < 0.0), 0.0, 1.0, width=NOTHING)
-    return part
+    fraction, _ = bisect(lambda t: bool(chord @ (cubic(one, other, t) - motion.z) < 0.0), 0.0, 1.0, width=NOTHING)
+    return fraction
 
 
 def crossing(followed: Followed, p: float) -> list[Point]:
     """The motions of a branch at a place of the line."""
-    found: list[Point] = []
+    motions: list[Point] = []
     if followed.branch is None:
-        return found
+        return motions
     newton = Newton(followed.problem, Settings())
     turns = [special.point for special in followed.branch.specials if special.kind == "fold"]
     along = sorted([*followed.branch.points, *turns], key=lambda point: point.s)  # stable, where charts change
@@ -392,11 +392,11 @@ def crossing(followed: Followed, p: float) -> list[Point]:
         guess = _near(one, other, p)
         point = newton.at_parameter(guess, p, other.z - one.z, one.s, exact=True)
         if point is not None:
-            found.append(point)
-    return found
+            motions.append(point)
+    return motions
 
 
 def _near(one: Point, other: Point, p: float) -> Array:
     """About where a branch passes a place of the line between two neighbours, by the cubic through them."""
-    part, _ = bisect(lambda t: bool(cubic(one, other, t)[-1] < p) is (one.p < p), 0.0, 1.0, width=NEAR)
-    return cubic(one, other, part)
+    fraction, _ = bisect(lambda t: bool(cubic(one, other, t)[-1] < p) is (one.p < p), 0.0, 1.0, width=NEAR)
+    return cubic(one, other, fraction)

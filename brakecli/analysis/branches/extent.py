@@ -77,6 +77,6 @@ def _extremes(values: Array, slopes: Array, spans: Array) -> tuple[Array, Array]
         q = -b - np.copysign(np.sqrt(b * b - 3.0 * a * c), b)
         turns = np.stack([q / (3.0 * c), a / q])
     turns = np.where((turns > 0.0) & (turns < 1.0), turns, 0.0)
-    found = values[:-1] + turns * (a + turns * (b + turns * c))
-    every = np.concatenate([values, *found])
+    extremes = values[:-1] + turns * (a + turns * (b + turns * c))
+    every = np.concatenate([values, *extremes])
     return every.min(axis=0), every.max(axis=0)

@@ -50,7 +50,7 @@ VERTICAL = 1e-9
 """Slope dp/ds below which a tangent is vertical."""
 
 
-def _left(off: Array, length: float) -> bool:
+def _strays(off: Array, length: float) -> bool:
     """Whether a point so far off its guess has left the branch in a stride of this length."""
     return math.sqrt(off @ off) > LEFT * length + OFF
 
@@ -144,8 +144,8 @@ class _Walk:
             here = points[-1]
             new = self._step(points, stride)
             if new is None:
-                seen = self.newton.seen
-                beyond = seen is not None and seen.word != here.word
+                evaluation = self.newton.last
+                beyond = evaluation is not None and evaluation.word != here.word
                 before = stride
                 stride = stride * (STRIDES.from_border if beyond else STRIDES.failed)
                 # a corner is tried as soon as the border is near, and at last in any case
@@ -192,9 +192,11 @@ class _Walk:
         return (point.p == self.settings.high and slope > 0.0) or (point.p == self.settings.low and slope < 0.0)
 
     def _lost(self, here: Point) -> End:
-        seen = self.newton.seen
-        crossed = seen is not None and seen.word != here.word
-        where = f" at a border: {self.problem.border(here.word, seen.word)}" if crossed and seen else ""
+        evaluation = self.newton.last
+        crossed = evaluation is not None and evaluation.word != here.word
+        where = (
+            f" at a border: {self.problem.border(here.word, evaluation.word)}" if crossed and evaluation else ""
+        )
         return End("lost", f"it is lost{where} ({self.newton.why})")
 
     def _step(self, points: list[Point], stride: float) -> Point | None:
@@ -211,7 +213,7 @@ class _Walk:
             return None if newton.outside is None else self._end_point(here, newton.outside)
         if not settings.low <= new.p <= settings.high:
             return self._end_point(here, new.z)
-        if _left(new.z - guess, stride):
+        if _strays(new.z - guess, stride):
             newton.why = "Newton's method leaves the branch"
             return None
         self._placed(here, new)
@@ -250,15 +252,15 @@ class _Walk:
     def _end_point(self, here: Point, beyond: Array) -> Point | None:
         """The point at the bound of the range, on the way to a place beyond it; None where it is elsewhere."""
         bound = self.settings.high if beyond[-1] > here.z[-1] else self.settings.low
-        part = (bound - here.z[-1]) / (beyond[-1] - here.z[-1])
-        if not 0.0 < part <= 1.0:
+        fraction = (bound - here.z[-1]) / (beyond[-1] - here.z[-1])
+        if not 0.0 < fraction <= 1.0:
             return None
-        guess = here.z + part * (beyond - here.z)
+        guess = here.z + fraction * (beyond - here.z)
         new = self.newton.at_parameter(guess, bound, here.tangent, 0.0, exact=True)
         if new is None or not self._at_bound(new):
             return None
         chord = new.z - here.z
-        if _left(new.z - guess, math.sqrt(chord @ chord)) or not float(chord @ here.tangent) > 0.0:
+        if _strays(new.z - guess, math.sqrt(chord @ chord)) or not float(chord @ here.tangent) > 0.0:
             return None
         return self._placed(here, new)
 
@@ -274,8 +276,8 @@ class _Walk:
         outside = np.flatnonzero((cubic > self.settings.high) | (cubic < self.settings.low))
         if not len(outside):
             return None
-        part = t[outside[0]]
-        guess = here.z + part * (new.z - here.z)
+        fraction = t[outside[0]]
+        guess = here.z + fraction * (new.z - here.z)
         guess[-1] = cubic[outside[0]]
         return self._end_point(here, guess)
 

@@ -22,7 +22,7 @@ from brakecli.analysis.branches.frame import NO_PERIOD, Frame, frame_of, resting
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.newton import Settings, start
 from brakecli.analysis.branches.point import Point
-from brakecli.analysis.branches.problem import Array, Doubled, Guess, Problem, Seen, steps_in_p
+from brakecli.analysis.branches.problem import Array, Doubled, Evaluation, Guess, Problem, steps_in_p
 from brakecli.errors import CaseError
 from brakecli.solver.motion.flow import Orbit
 from brakecli.solver.motion.rough import STEPS_PER_PERIOD, Flown, RoughFlow, Status
@@ -99,7 +99,7 @@ class Forced(Doubled):
         frame = self.frame
         steps = [replace(frame, steps=math.ceil(more * frame.steps)) for more in (factor, 0.5 + 0.5 * factor)]
         cells = replace(frame, cells=2 * math.ceil(0.5 * factor * frame.cells))
-        return [Forced(self.system, each, self.periods) for each in (*steps, cells)]
+        return [Forced(self.system, variant, self.periods) for variant in (*steps, cells)]
 
     @property
     def segments(self) -> int:
@@ -140,14 +140,14 @@ class Forced(Doubled):
         ends = (np.array([run.state for run in runs]) - origin) / frame.scales
         return _Flown(runs, ends, cyclic(tuple(word)), self.periods * period)
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         """Carry the state of each segment to its end; the gaps and their derivatives."""
-        found = self._flown(u, p)
-        if isinstance(found, str):
-            return found
+        flown = self._flown(u, p)
+        if isinstance(flown, str):
+            return flown
         m = self.segments
         scales = self.frame.scales
-        runs = found.runs
+        runs = flown.runs
         maps = np.array([run.derivative for run in runs]) * (scales / scales[:, None])
         if not np.isfinite(maps).all():
             return "disturbances grow without bound"
@@ -155,33 +155,33 @@ class Forced(Doubled):
         for k in range(m):
             by_u[k, :, k] += maps[k]
             by_u[k, :, (k + 1) % m] -= np.eye(4)
-        gap = (found.ends - np.roll(u.reshape(m, 4), -1, axis=0)).ravel()
-        by_p = self._by_p(u, p, found) if with_parameter else None
-        facts = self._facts(u, p, found)
+        gap = (flown.ends - np.roll(u.reshape(m, 4), -1, axis=0)).ravel()
+        by_p = self._by_p(u, p, flown) if with_parameter else None
+        facts = self._facts(u, p, flown)
         if with_parameter and by_p is None:
             return "the derivative by the parameter meets a border, or the end of what is valid"
-        return Seen(
+        return Evaluation(
             gap,
             by_u.reshape(4 * m, 4 * m),
             by_p,
             maps,
-            found.word,
+            flown.word,
             facts,
-            self._margins(p, found),
+            self._margins(p, flown),
             facts.amplitude / float(scales[0]),
         )
 
-    def _facts(self, u: Array, p: float, found: _Flown) -> Orbit:
-        runs = found.runs
+    def _facts(self, u: Array, p: float, flown: _Flown) -> Orbit:
+        runs = flown.runs
         margins = [run.margins for run in runs]
-        segment = found.period / len(runs)
+        segment = flown.period / len(runs)
         return Orbit(
-            found.period,
+            flown.period,
             0.5 * (max(run.x[1] for run in runs) - min(run.x[0] for run in runs)),
-            sum(each.stick_share for each in margins) / len(runs),
-            sum(each.open_share for each in margins) / len(runs),
+            sum(margin.stick_share for margin in margins) / len(runs),
+            sum(margin.open_share for margin in margins) / len(runs),
             tuple((self.origin(p) + u[:4] * self.frame.scales).tolist()),
-            found.word,
+            flown.word,
             tuple(k * segment + time for k, run in enumerate(runs) for time in run.times),
         )
 
@@ -199,21 +199,21 @@ class Forced(Doubled):
 
         return extent([*states], motion.period, motion.times, self.frame.steps, carry)
 
-    def _margins(self, p: float, found: _Flown) -> tuple[float, ...]:
+    def _margins(self, p: float, flown: _Flown) -> tuple[float, ...]:
         """How far a motion in slip alone is from stick: its least sliding speed over that of the wheel."""
-        if len(found.word) > 1 or found.word[0] == STICK:
+        if len(flown.word) > 1 or flown.word[0] == STICK:
             return ()
         belt = self.flow(p)[0].system.belt_speed
-        return (min(run.margins.slide for run in found.runs) / abs(belt),)
+        return (min(run.margins.slide for run in flown.runs) / abs(belt),)
 
-    def _by_p(self, u: Array, p: float, found: _Flown) -> Array | None:
+    def _by_p(self, u: Array, p: float, flown: _Flown) -> Array | None:
         """The derivative of the gaps by p, of the same sequence of phases, to the first side that has it."""
         for step in steps_in_p(DIFFERENCE if p < 0.5 else -DIFFERENCE):
             if not 0.0 <= p + step <= 1.0:
                 continue
             beside = self._flown(u, p + step, derivative=False)
-            if not isinstance(beside, str) and beside.word == found.word:
-                return np.asarray(((beside.ends - found.ends) / step).ravel())
+            if not isinstance(beside, str) and beside.word == flown.word:
+                return np.asarray(((beside.ends - flown.ends) / step).ravel())
         return None
 
     def border(self, before: Any, after: Any) -> str:
@@ -249,8 +249,8 @@ class Forced(Doubled):
             return None
         wheel = system.wheel
 
-        def with_waves(part: float) -> System:
-            return replace(system, wheel=wheel._replace(g=part * wheel.g))
+        def with_waves(fraction: float) -> System:
+            return replace(system, wheel=wheel._replace(g=fraction * wheel.g))
 
         here = replace(self.frame, origins=self.frame.origin(p)[None, :2])
         problem = Forced(with_waves, here, self.periods)
@@ -290,9 +290,9 @@ class Forced(Doubled):
         for count in sorted(gaps, key=lambda count: (gaps[count], count)):
             if not gaps[count] < AT_REPEAT:
                 break
-            found = self._repeating(np.concatenate(visited[begin : begin + count * frame.segments]), p, count)
-            if found is not None:
-                return found
+            motion = self._repeating(np.concatenate(visited[begin : begin + count * frame.segments]), p, count)
+            if motion is not None:
+                return motion
         return None
 
     def _repeating(self, guess: Array, p: float, count: int) -> "tuple[Forced, Point] | None":
@@ -301,10 +301,10 @@ class Forced(Doubled):
         point = start(problem, guess, p)
         if point is None or not float(np.abs(point.u - guess).max()) < 2.0 * AT_REPEAT:
             return None
-        for fewer in (each for each in range(1, count) if count % each == 0):
-            part = point.u[: len(point.u) // count * fewer]
-            if float(np.abs(np.tile(part, count // fewer) - point.u).max()) < SAME:
-                less = self._repeating(part, p, fewer)
+        for fewer in (divisor for divisor in range(1, count) if count % divisor == 0):
+            begin = point.u[: len(point.u) // count * fewer]
+            if float(np.abs(np.tile(begin, count // fewer) - point.u).max()) < SAME:
+                less = self._repeating(begin, p, fewer)
                 if less is not None:
                     return less
         return problem, point

@@ -66,15 +66,15 @@ def frame_of(line: Line, per_period: float) -> Frame:
     middle = periods[len(periods) // 2][0]
     depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)
     fast = 2.0 * math.pi * middle.natural_frequencies[1]
-    known = {k: rest[:2] for k, system in systems.items() if (rest := resting(system)) is not None}
-    places = np.array(sorted(known))
+    positions = {k: state[:2] for k, system in systems.items() if (state := resting(system)) is not None}
+    places = np.array(sorted(positions))
     origins = np.zeros((PLACES, 2))
-    for k in range(PLACES if known else 0):
-        origins[k] = known[int(places[np.argmin(np.abs(places - k))])]
+    for k in range(PLACES if positions else 0):
+        origins[k] = positions[int(places[np.argmin(np.abs(places - k))])]
     return Frame(segments, steps, cells, depth * np.array([1.0, 1.0, fast, fast]), origins)
 
 
 def resting(system: System) -> Array | None:
     """Steady sliding as a state; None where there is none."""
-    found = sliding(system, tabulated(system))
-    return np.array([found.x, found.y, 0.0, 0.0]) if found else None
+    equilibrium = sliding(system, tabulated(system))
+    return np.array([equilibrium.x, equilibrium.y, 0.0, 0.0]) if equilibrium else None

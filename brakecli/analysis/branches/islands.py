@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from brakecli.analysis.branches.problem import Array
+from brakecli.analysis.branches.rows import Followed
 from brakecli.analysis.branches.sliding import Change, Slide, stable_spans
-from brakecli.analysis.branches.told import Followed
 from brakecli.analysis.fate import fate_on_smooth_pads
 from brakecli.analysis.shoe import Shoe
 from brakecli.solver.motion.flow import Orbit
@@ -70,18 +70,18 @@ def places(slides: Sequence[Slide], changes: Sequence[Change], own: float | None
     if not spans:
         return []
     inside = own is not None and any(low < own < high for low, high in spans)
-    found = [Place(own, 0, number)] if own is not None and inside else []
-    first = number * len(found)
+    result = [Place(own, 0, number)] if own is not None and inside else []
+    first = number * len(result)
     edges = np.linspace(first, PARTS * number, VALUES + 1).astype(int).tolist()
     whole = sum(high - low for low, high in spans)
     for k, (begin, end) in enumerate(pairwise(edges)):
         ahead = (k + 0.5) / VALUES * whole
         for low, high in spans:
             if ahead < high - low:
-                found.append(Place(low + ahead, begin, end - begin))
+                result.append(Place(low + ahead, begin, end - begin))
                 break
             ahead -= high - low
-    return [place for place in found if place.number]
+    return [place for place in result if place.number]
 
 
 def pushes(first: int, count: int, smallest: float) -> Array:
@@ -100,7 +100,7 @@ def pushes(first: int, count: int, smallest: float) -> Array:
     return np.asarray((smallest * (LARGEST / smallest) ** size * sphere).T)
 
 
-def tried(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> Tried:
+def try_pushes(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> Tried:
     """What the pushes from a number on come to."""
     c = shoe.coefficients
     orbits = list[Orbit]()
@@ -109,7 +109,7 @@ def tried(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> Tried
     if shoe.rest is None or not shoe.rest[1] < 0.0:
         return Tried(0, 0, [])
     fastest = math.sqrt((c.c_xx + c.c_yy + shoe.stiffness) / c.m)  # rad/s; at most this, by the trace
-    rest = np.array([*shoe.rest, 0.0, 0.0])
+    equilibrium = np.array([*shoe.rest, 0.0, 0.0])
     depth = -shoe.rest[1]
     scales = depth * np.array([1.0, 1.0, fastest, fastest])
     longest = LONGEST * 2.0 * math.pi / fastest
@@ -118,7 +118,7 @@ def tried(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> Tried
         if stop():
             break
         done += 1
-        end = fate_on_smooth_pads(shoe, rest + scales * push, longest)
+        end = fate_on_smooth_pads(shoe, equilibrium + scales * push, longest)
         undecided += end.lasts is None
         if end.orbit is not None and not any(_alike(end.orbit, orbit) for orbit in orbits):
             orbits.append(end.orbit)

@@ -26,7 +26,7 @@ ALONE = {"shoe", "wheel", "link1", "link2", "load", "friction", "contact"}
 NODES = 33
 """Chebyshev's nodes between which the numbers of shoes are interpolated."""
 _PLACES = 0.5 + 0.5 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
-_NUMBERS = {place: number for number, place in enumerate(_PLACES.tolist())}
+_NUMBERS = {node: number for number, node in enumerate(_PLACES.tolist())}
 _WEIGHTS = np.sin(np.pi * (np.arange(NODES) + 0.5) / NODES) * (-1.0) ** np.arange(NODES)
 
 EXACT = 1e-13
@@ -53,10 +53,10 @@ class Line:
         self.high = high
         self.label = label
         self._paths = [key_path(key) for key in keys]
-        given = case.model_dump(exclude_unset=True)
+        tables = case.model_dump(exclude_unset=True)
         touched = {path[0] for path in self._paths if path}
-        self._given = {
-            name: getattr(case, name) if name in ALONE - touched else table for name, table in given.items()
+        self._tables = {
+            name: getattr(case, name) if name in ALONE - touched else table for name, table in tables.items()
         }
         self.system = lru_cache(maxsize=MOST_KEPT)(self._system)
         self.shoe = lru_cache(maxsize=MOST_KEPT)(self._shoe)
@@ -73,8 +73,8 @@ class Line:
         values = set[object]()
         for path in self._paths:
             table: object = self.case
-            for part in path:
-                table = getattr(table, part, None)
+            for key in path:
+                table = getattr(table, key, None)
             values.add(table)
         (value,) = values if len(values) == 1 else (None,)
         inside = isinstance(value, int | float) and min(self.low, self.high) <= value <= max(self.low, self.high)
@@ -94,34 +94,35 @@ class Line:
 
     def case_with(self, value: float) -> Case:
         """The case whose keys have a value; raises CaseError where it is not valid."""
-        data = dict(self._given)
+        data = dict(self._tables)
         for path in self._paths:
-            data[path[0]] = deepcopy(self._given.get(path[0], {}))
+            data[path[0]] = deepcopy(self._tables.get(path[0], {}))
         for path in self._paths:
             put(data, path, value, Case, kept=self._paths)
         try:
             return Case.model_validate(data)
         except ValidationError as error:
-            raise CaseError([replace(each, source=self.label) for each in wording.problems(error, Case)]) from None
+            problems = [replace(problem, source=self.label) for problem in wording.problems(error, Case)]
+            raise CaseError(problems) from None
 
     def systems(self, places: int) -> dict[int, System]:
         """The systems at equally distant places, by their numbers, where the case is valid.
 
         Raises CaseError where it is nowhere valid, and where speed or load change.
         """
-        found = dict[int, System]()
+        systems = dict[int, System]()
         failed = None
         for k in range(places):
             try:
-                found[k] = self.system(k / (places - 1))
+                systems[k] = self.system(k / (places - 1))
             except CaseError as error:
                 failed = error
-        if not found and failed is not None:
+        if not systems and failed is not None:
             raise failed
-        if not all(system.steady for system in found.values()):
+        if not all(system.steady for system in systems.values()):
             what = "the speed of the wheel or the load changes in time"
             raise CaseError([Problem(("wheel",), what, "give constant ones", source=self.label)])
-        return found
+        return systems
 
     def _system(self, p: float) -> System:
         """The system at p; raises CaseError where the case is not valid."""
@@ -149,8 +150,8 @@ class Line:
             )
         except CaseError:
             return None
-        found = np.array([_interpolated(table, p) for p in between.tolist()])
-        return table if np.all(np.abs(found - exact) <= EXACT * np.abs(table).max(axis=0)) else None
+        interpolated = np.array([_interpolated(table, p) for p in between.tolist()])
+        return table if np.all(np.abs(interpolated - exact) <= EXACT * np.abs(table).max(axis=0)) else None
 
 
 def _row(shoe: Shoe) -> list[float]:

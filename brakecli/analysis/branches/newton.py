@@ -7,7 +7,7 @@ import numpy as np
 
 from brakecli.analysis.branches.multipliers import spectrum
 from brakecli.analysis.branches.point import Point, cubic
-from brakecli.analysis.branches.problem import Array, Problem, Seen
+from brakecli.analysis.branches.problem import Array, Evaluation, Problem
 
 ROUNDING = 1e-9
 """Gap that may grow from one correction to the next, and part of the range by which p may leave it."""
@@ -86,20 +86,21 @@ class Newton:
         self.evaluations = 0
         self.why = ""
         """Why the last correction failed."""
-        self.seen: Seen | None = None
+        self.last: Evaluation | None = None
         """What was evaluated last, also where the correction failed."""
         self.outside: Array | None = None
         """Where the last correction left the range of the parameter, if it failed for that."""
 
-    def evaluate(self, z: Array, with_parameter: bool) -> Seen | None:
+    def evaluate(self, z: Array, with_parameter: bool) -> Evaluation | None:
         """Evaluate a place; None, with the reason in `why`, where that is impossible."""
         settings = self.settings
         self.evaluations += 1
-        found = self.problem.evaluate(z[:-1], min(max(float(z[-1]), settings.low), settings.high), with_parameter)
-        if isinstance(found, Seen):
-            self.seen = found
-            return found
-        self.why = found or "the motion cannot be computed there"
+        p = min(max(float(z[-1]), settings.low), settings.high)
+        evaluation = self.problem.evaluate(z[:-1], p, with_parameter)
+        if isinstance(evaluation, Evaluation):
+            self.last = evaluation
+            return evaluation
+        self.why = evaluation or "the motion cannot be computed there"
         return None
 
     def solved(
@@ -111,7 +112,7 @@ class Newton:
         word changes, the place moves far, or the branch is steep; `exact` takes it in every iteration.
         """
         settings = self.settings
-        self.seen = self.outside = None
+        self.last = self.outside = None
         near = settings.exact if exact else settings.near
         n = len(guess) - 1
         matrix = np.empty((n + 1, n + 1))
@@ -131,22 +132,22 @@ class Newton:
                 self.outside = z
                 self.why = "the parameter leaves its range"
                 return None
-            seen = self.evaluate(z, by_p is None or exact)
-            if seen is not None and seen.by_p is None and seen.word != word:
-                seen = self.evaluate(z, True)
-            if seen is None:
+            evaluation = self.evaluate(z, by_p is None or exact)
+            if evaluation is not None and evaluation.by_p is None and evaluation.word != word:
+                evaluation = self.evaluate(z, True)
+            if evaluation is None:
                 return None
-            if seen.by_p is not None:
-                by_p = seen.by_p
-                word = seen.word
+            if evaluation.by_p is not None:
+                by_p = evaluation.by_p
+                word = evaluation.word
                 taken = z
-            gap = float(np.abs(seen.gap).max())
+            gap = float(np.abs(evaluation.gap).max())
             if not gap <= GROWS * last + ROUNDING:
                 break
             last = gap
-            matrix[:n, :n] = seen.by_u
+            matrix[:n, :n] = evaluation.by_u
             matrix[:n, n] = by_p
-            right[:n, 0] = -seen.gap
+            right[:n, 0] = -evaluation.gap
             right[n, 0] = normal @ (guess - z)
             step, tangent, length = self._solution(matrix, right)
             size = float(np.abs(step).max())
@@ -165,17 +166,17 @@ class Newton:
                 abs(tangent[n]) < settings.steep * length
                 or float(np.abs(z - taken).max()) * lever > settings.stale
             ):
-                seen = self.evaluate(z, True)
-                if seen is None:
+                evaluation = self.evaluate(z, True)
+                if evaluation is None:
                     return None
-                matrix[:n, n] = seen.by_p
+                matrix[:n, n] = evaluation.by_p
                 step, tangent, length = self._solution(matrix, right)
                 if not length < math.inf:
                     break
             z = z + step
-            if size > settings.near * seen.size and (reached := self.evaluate(z, False)) is not None:
-                seen = seen._replace(facts=reached.facts)
-            return self._point(z, tangent / length, length, matrix, onward, s, seen)
+            if size > settings.near * evaluation.size and (reached := self.evaluate(z, False)) is not None:
+                evaluation = evaluation._replace(facts=reached.facts)
+            return self._point(z, tangent / length, length, matrix, onward, s, evaluation)
         self.why = "Newton's method does not converge"
         return None
 
@@ -189,13 +190,20 @@ class Newton:
         return step, tangent, math.sqrt(tangent @ tangent)
 
     def _point(
-        self, z: Array, tangent: Array, length: float, matrix: Array, onward: Array, s: float, seen: Seen
+        self,
+        z: Array,
+        tangent: Array,
+        length: float,
+        matrix: Array,
+        onward: Array,
+        s: float,
+        evaluation: Evaluation,
     ) -> Point:
         sign, log = np.linalg.slogdet(matrix)
         if tangent @ onward < 0.0:
             tangent = -tangent
             sign = -sign
-        multipliers = spectrum(seen.maps)
+        multipliers = spectrum(evaluation.maps)
         return Point(
             z=z,
             tangent=tangent,
@@ -206,17 +214,17 @@ class Newton:
             coefficients=multipliers.coefficients,
             # the normal in the last row becomes the tangent, whose part along the normal is 1 / length
             orientation=(float(sign), float(log) + math.log(length)),
-            word=seen.word,
-            facts=seen.facts,
+            word=evaluation.word,
+            facts=evaluation.facts,
             chart=self.problem.chart,
-            maps=seen.maps,
-            margins=seen.margins,
+            maps=evaluation.maps,
+            margins=evaluation.margins,
         )
 
     def holds(self, point: Point) -> bool:
         """Whether the word of a point is that of its place: its last correction may have led across a border."""
-        seen = self.evaluate(point.z, False)
-        return seen is not None and seen.word == point.word
+        evaluation = self.evaluate(point.z, False)
+        return evaluation is not None and evaluation.word == point.word
 
     def at_parameter(self, guess: Array, p: float, onward: Array, s: float, exact: bool = False) -> Point | None:
         """Find the point at a value of the parameter."""
@@ -224,28 +232,28 @@ class Newton:
         guess[-1] = p
         normal = np.zeros(len(guess))
         normal[-1] = 1.0
-        found = self.solved(guess, normal, onward, s, exact)
-        if found is not None:
-            found.z[-1] = p
-        return found
+        point = self.solved(guess, normal, onward, s, exact)
+        if point is not None:
+            point.z[-1] = p
+        return point
 
-    def between(self, one: Point, other: Point, part: float) -> Point | None:
+    def between(self, one: Point, other: Point, fraction: float) -> Point | None:
         """Find the point at a part of the way between two neighbours, which share a chart."""
         chord = other.z - one.z
         length = math.sqrt(chord @ chord)
         if length == 0.0:
             return None
-        guess = cubic(one, other, part)
+        guess = cubic(one, other, fraction)
         onward = one.tangent + other.tangent if one.word == other.word else chord
         # the direction of a very short chord is mostly rounding
         normal = chord / length if length > SHORT else one.tangent
-        found = self.solved(guess, normal, onward, one.s + part * (other.s - one.s), exact=True)
-        if found is not None:
-            off = found.z - guess
+        point = self.solved(guess, normal, onward, one.s + fraction * (other.s - one.s), exact=True)
+        if point is not None:
+            off = point.z - guess
             if off @ off > (LEFT * length) ** 2 + OFF**2:
                 self.why = "another branch lies beside this one"
                 return None
-        return found
+        return point
 
 
 def zero(low: float, high: float, at_ends: float = AT_ENDS) -> float:

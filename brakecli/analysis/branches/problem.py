@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-class Seen(NamedTuple):
+class Evaluation(NamedTuple):
     """What a problem says of one place."""
 
     gap: Array
@@ -59,7 +59,7 @@ class Problem(Protocol):
     chart: Any = None
     """Scaling, phase condition and the like by which `u` is to be read now. Charts are compared by identity."""
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         """Evaluate a place. A string says why the motion cannot be computed there; None gives no reason."""
 
     def finer(self, factor: float) -> "list[Problem]":

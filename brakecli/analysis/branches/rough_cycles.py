@@ -104,10 +104,10 @@ class RoughCycles(Cycles):
     def _flow(self, p: float) -> Flow:
         return Span(RoughFlow(self.line.system(p), self.cells), self.per_period)
 
-    def _rest(self, p: float) -> Array:
+    def _equilibrium(self, p: float) -> Array:
         system = self.line.system(p)
-        found = steady_sliding(system, mean=tabulated(system))
-        return np.array([found.x, found.y, 0.0, 0.0])
+        steady = steady_sliding(system, mean=tabulated(system))
+        return np.array([steady.x, steady.y, 0.0, 0.0])
 
     def _over_period(self, flow: Flow, state: Array, periods: float, chart: Chart, derivative: bool) -> int:
         assert isinstance(flow, Span)

@@ -82,8 +82,8 @@ def _between(newton: Newton, points: list[Point], specials: list[Special]) -> No
             continue
         places = sorted(special.s for special in specials if one.s < special.s < other.s)
         newton.problem.use(one.chart)
-        parts = [(0.5 * (a + b) - one.s) / (other.s - one.s) for a, b in pairwise(places)]
-        middles = [newton.between(one, other, part) for part in parts]
+        fractions = [(0.5 * (a + b) - one.s) / (other.s - one.s) for a, b in pairwise(places)]
+        middles = [newton.between(one, other, fraction) for fraction in fractions]
         points[k + 1 : k + 1] = [middle for middle in middles if middle is not None and middle.word == one.word]
 
 
@@ -155,9 +155,9 @@ def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | Non
     """A point between two of different words, on the side of one of them."""
     stride = 0.5 * (far.s - near.s) * (1.0 if base is near else -1.0)
     for _ in range(TRIES):
-        found = newton.solved(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
-        if found is not None and found.word == base.word:
-            return found
+        point = newton.solved(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
+        if point is not None and point.word == base.word:
+            return point
         stride *= SHORTER
     return None
 
@@ -165,38 +165,38 @@ def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | Non
 def _insert(newton: Newton, points: list[Point], over: Over, margins: bool = False) -> str:
     """Insert points until no test, or no margin of the word, may vanish twice between two neighbours."""
     settings = newton.settings
-    left = newton.settings.insertions
+    insertions = newton.settings.insertions
     finished: set[tuple[int, int]] = set()  # pairs, by identity, that need no further look
-    held = list(points)  # keeps every point alive, so that identities stay unique
+    alive = list(points)  # keeps every point alive, so that identities stay unique
     while True:
         wanted = [
-            (k, part)
-            for k, part in _suspects(points, settings.everywhere, margins)
+            (k, fraction)
+            for k, fraction in _suspects(points, settings.everywhere, margins)
             if (id(points[k]), id(points[k + 1])) not in finished and points[k + 1].s - points[k].s > settings.gap
         ]
         if not wanted:
             return ""
-        for k, part in reversed(wanted):  # from the end, so that places stay valid
+        for k, fraction in reversed(wanted):  # from the end, so that places stay valid
             end = over()
             if end is not None:
                 return end.reason
-            if left <= 0:
+            if insertions <= 0:
                 return f"the budget of {settings.insertions} inserted points is spent"
             one = points[k]
             other = points[k + 1]
             newton.problem.use(one.chart)
-            new = newton.between(one, other, part) or newton.between(one, other, 0.5)
+            new = newton.between(one, other, fraction) or newton.between(one, other, 0.5)
             if new is None or (new.word != one.word and not margins):
                 finished.add((id(one), id(other)))
                 continue
             points.insert(k + 1, new)
-            held.append(new)
-            left -= 1
+            alive.append(new)
+            insertions -= 1
 
 
 def _suspects(points: list[Point], everywhere: bool, margins: bool) -> list[tuple[int, float]]:
     """Strides in which a test may vanish twice, with the part of the stride at which that is likeliest."""
-    found: list[tuple[int, float]] = []
+    suspects: list[tuple[int, float]] = []
     begin = 0
     for k in range(1, len(points) + 1):
         if k == len(points) or not _one_piece(points[k - 1], points[k]):
@@ -204,9 +204,9 @@ def _suspects(points: list[Point], everywhere: bool, margins: bool) -> list[tupl
             if len(piece) > 1 and (piece[0].margins or not margins):
                 s = np.array([point.s for point in piece])
                 tests = np.array([point.margins if margins else point.tests for point in piece])
-                found += [(begin + j, part) for j, part in _near_zeros(s, tests, everywhere or margins)]
+                suspects += [(begin + j, fraction) for j, fraction in _near_zeros(s, tests, everywhere or margins)]
             begin = k
-    return found
+    return suspects
 
 
 def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, float]]:
@@ -257,35 +257,35 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     curved = bend > np.abs(slope) / 2.0
     offset = np.where(curved, -0.5 * slope / np.where(curved, bend, 1.0), 0.0)
     least = least + 0.25 * slope * offset
-    place = (middle[:, 0] + 1 + offset) / (len(GRID) - 1)
+    lowest = (middle[:, 0] + 1 + offset) / (len(GRID) - 1)
     suspect = same & (least <= 0.0)
     if not everywhere:  # a test of the multipliers that is negative all along proves the motion unstable
         negative = same & (first < 0.0) & (least > 0.0)
         suspect &= ~negative[:, FOLD:].any(axis=1)[:, None]
-    found = []
+    suspects = []
     for k in np.flatnonzero(suspect.any(axis=1)).tolist():
         test = int(np.flatnonzero(suspect[k])[0])
-        found.append((k, min(max(float(place[k, test]), ASIDE), 1.0 - ASIDE)))
-    return found
+        suspects.append((k, min(max(float(lowest[k, test]), ASIDE), 1.0 - ASIDE)))
+    return suspects
 
 
 def _changes(newton: Newton, one: Point, other: Point) -> list[Special]:
     """The special points between two neighbours of one smooth piece."""
-    found = []
+    specials = []
     turns = _differ(one, other, TURN)
     if turns:
-        found.append(_located(newton, one, other, "fold", lambda point: point.tests[TURN]))
+        specials.append(_located(newton, one, other, "fold", lambda point: point.tests[TURN]))
     # a change of the bordered determinant that neither p nor det(I - M) shows is none of the motion
     if one.orientation[0] * other.orientation[0] < 0.0 and (turns or _differ(one, other, FOLD)):
         top = max(one.orientation[1], other.orientation[1])
-        found.append(_located(newton, one, other, "branch point", lambda point: _determinant(point, top)))
+        specials.append(_located(newton, one, other, "branch point", lambda point: _determinant(point, top)))
     if _differ(one, other, FLIP):
-        found.append(_located(newton, one, other, "flip", lambda point: point.tests[FLIP]))
+        specials.append(_located(newton, one, other, "flip", lambda point: point.tests[FLIP]))
     if _differ(one, other, TORUS) and not (_saddle(one) and _saddle(other)):
         torus = _located(newton, one, other, "torus", lambda point: point.tests[TORUS])
         if not _saddle(torus.point):
-            found.append(torus)
-    return found
+            specials.append(torus)
+    return specials
 
 
 def _differ(one: Point, other: Point, test: int) -> bool:
@@ -313,10 +313,10 @@ def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable
     error = abs(other.p - one.p)
     side = 0
     for _ in range(MOST_STEPS):
-        part = zero(low, high, AT_END)
+        fraction = zero(low, high, AT_END)
         # Newton's method fails very near a branch point: then a little before it, or behind it
-        for place in (part, (1.0 - ASIDE) * part, ASIDE + (1.0 - ASIDE) * part):
-            new = newton.between(one, other, place)
+        for trial in (fraction, (1.0 - ASIDE) * fraction, ASIDE + (1.0 - ASIDE) * fraction):
+            new = newton.between(one, other, trial)
             if new is not None:
                 break
         if new is None or new.word != one.word:

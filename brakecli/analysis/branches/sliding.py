@@ -39,7 +39,7 @@ class Slide:
     p: float
     eigenvalues: Complex | None
     vectors: Complex | None
-    rest: tuple[float, float] | None
+    equilibrium: tuple[float, float] | None
     signs: list[Rounded] | None
 
     @property
@@ -87,18 +87,19 @@ class Sliding:
         try:
             if line.smooth:
                 c, stiffness, belt, load = shoe = line.shoe(p)
-                pressed = (rest := shoe.rest) is not None and -stiffness * rest[1] > PRESSED * abs(load)
+                equilibrium = shoe.rest
+                pressed = equilibrium is not None and -stiffness * equilibrium[1] > PRESSED * abs(load)
             else:
                 system = line.system(p)
-                found = sliding(system, tabulated(system))
+                steady = sliding(system, tabulated(system))
                 c = system.coefficients
-                stiffness = found.stiffness if found else system.contact_stiffness
+                stiffness = steady.stiffness if steady else system.contact_stiffness
                 belt = system.belt_speed
-                rest = (found.x, found.y) if found else None
-                pressed = found is not None and found.is_pressed(system.load_at_start)
+                equilibrium = (steady.x, steady.y) if steady else None
+                pressed = steady is not None and steady.is_pressed(system.load_at_start)
         except CaseError:
             return nothing
-        locks = rest is None
+        locks = equilibrium is None
         if belt == 0.0 or not (pressed or locks):
             return nothing
         grip = c.grip(belt)
@@ -106,7 +107,7 @@ class Sliding:
         if locks:  # beyond divergence there is no steady sliding, and the determinant says where it ended
             return nothing if signs[0].value > signs[0].error else Slide(p, None, None, None, signs)
         values, vectors = eigensystem(c, stiffness, grip)
-        return Slide(p, values, vectors, rest, signs)
+        return Slide(p, values, vectors, equilibrium, signs)
 
     def _margin(self, p: float) -> list[Rounded] | None:
         return self.at(p).signs
@@ -120,7 +121,7 @@ class Sliding:
 
     def changes(self, slides: list[Slide]) -> list[Change]:
         """Where stability is lost or regained, in the order of p."""
-        found = []
+        changes = []
         for change in margin.between(self._margin, [slide.p for slide in slides]):
             if change.which is None:  # steady sliding itself ends
                 continue
@@ -130,8 +131,8 @@ class Sliding:
                 assert values is not None
                 frequency = abs(float(values[int(np.argmax(values.real))].imag)) / (2.0 * math.pi)
             kind = "flutter" if change.which == margin.FLUTTER else "divergence"
-            found.append(Change(kind, change.value, change.error, frequency, change.lost))
-        return found
+            changes.append(Change(kind, change.value, change.error, frequency, change.lost))
+        return changes
 
     def _rises(self, p: float, y: float) -> float:
         """How far (m) the shoe may rise from a height y (m) until the stiffness of the contact changes."""
@@ -149,7 +150,7 @@ class Sliding:
         """
         slide = self.at(change.p)
         belt = self.line.shoe(change.p).belt
-        if slide.eigenvalues is None or slide.vectors is None or slide.rest is None:
+        if slide.eigenvalues is None or slide.vectors is None or slide.equilibrium is None:
             return None
         which = int(np.argmin(np.abs(slide.eigenvalues - 2j * math.pi * change.frequency)))
         omega = float(slide.eigenvalues[which].imag)
@@ -158,7 +159,7 @@ class Sliding:
         w = (np.concatenate([shape, 1j * omega * shape])[:, None] * turning).real
         ahead = w[2] * math.copysign(1.0, belt)
         stick = abs(belt) / ahead.max()
-        flight = self._rises(change.p, slide.rest[1]) / w[1].max()
+        flight = self._rises(change.p, slide.equilibrium[1]) / w[1].max()
         size = BELOW_GRAZING * min(stick, flight)
         touch = int(np.argmax(ahead if stick < flight else w[1]))
         mode = size * w[:, (touch + PHASES // 2) % PHASES]  # far from where it will graze

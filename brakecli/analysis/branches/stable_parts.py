@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from brakecli.analysis.branches.bar import Bound, located
 from brakecli.analysis.branches.newton import Newton, Settings
-from brakecli.analysis.branches.told import Followed
+from brakecli.analysis.branches.rows import Followed
 
 NARROWEST = 1e-6
 """Part of the range below which an interval is that of rounding."""
@@ -25,7 +25,7 @@ class Part(NamedTuple):
 
 def stable_parts(followed: Followed) -> list[Part]:
     """The stable parts of a branch, each up to the special point behind its last motion."""
-    found = list[Part]()
+    parts = list[Part]()
     branch = followed.branch
     points = branch.points if branch else []
     for stable, group in groupby(range(len(points)), lambda k: points[k].stable):
@@ -33,14 +33,14 @@ def stable_parts(followed: Followed) -> list[Part]:
             continue
         places = [*group]
         ends = [_bound(followed, places[0], -1), _bound(followed, places[-1], 1)]
-        part = [points[k] for k in places]
+        motions = [points[k] for k in places]
         low, high = (
             min([*ends, *_turns(followed, places, way)], key=lambda bound: way * bound.p) for way in (1, -1)
         )
-        special = [each.point for each in branch.specials if each.p == low.p] if branch else []
-        lowest = special[0] if special else min(part, key=lambda point: point.p)
-        found.append(Part(low, high, lowest.facts.frequency))
-    return found
+        at_low = [special.point for special in branch.specials if special.p == low.p] if branch else []
+        lowest = at_low[0] if at_low else min(motions, key=lambda point: point.p)
+        parts.append(Part(low, high, lowest.facts.frequency))
+    return parts
 
 
 def _turns(followed: Followed, places: list[int], way: int) -> list[Bound]:
@@ -79,11 +79,11 @@ def _bound(followed: Followed, k: int, way: int) -> Bound:
             pair = (point, beyond) if way > 0 else (beyond, point)
             p = located(Newton(problem, Settings()), *pair)
         return Bound(p, 0.0, point, beyond, problem)
-    special = min(between, key=lambda each: abs(each.s - point.s))
+    special = min(between, key=lambda special: abs(special.s - point.s))
     return Bound(special.p, special.error, point, beyond, problem)
 
 
-def told_apart(bounds: list[Bound]) -> list[Bound]:
+def separate(bounds: list[Bound]) -> list[Bound]:
     """The bounds in order, with their bars, without pairs that are closer than both their bars.
 
     An interval that is so narrow may be none; so may what lies between two.
@@ -92,22 +92,22 @@ def told_apart(bounds: list[Bound]) -> list[Bound]:
     for k, (one, other) in enumerate(pairwise(bounds)):
         bars = one.error, other.error
         if one.known and other.known and other.p - one.p < min(bars):
-            return told_apart([*bounds[:k], *bounds[k + 2 :]])
+            return separate([*bounds[:k], *bounds[k + 2 :]])
     return bounds
 
 
-def merged(spans: list[Span]) -> list[Span]:
+def merge(spans: list[Span]) -> list[Span]:
     """The union of spans, in order."""
-    return [(part.low.p, part.high.p) for part in united([Part(Bound(a), Bound(b), 0.0) for a, b in spans])]
+    return [(piece.low.p, piece.high.p) for piece in unite([Part(Bound(a), Bound(b), 0.0) for a, b in spans])]
 
 
-def united(parts: list[Part]) -> list[Part]:
+def unite(parts: list[Part]) -> list[Part]:
     """The union of parts, in order."""
-    found = list[Part]()
-    for part in sorted(parts, key=lambda part: part.low.p):
-        if found and part.low.p <= found[-1].high.p + NARROWEST:
-            if part.high.p > found[-1].high.p:
-                found[-1] = found[-1]._replace(high=part.high)
+    union = list[Part]()
+    for piece in sorted(parts, key=lambda piece: piece.low.p):
+        if union and piece.low.p <= union[-1].high.p + NARROWEST:
+            if piece.high.p > union[-1].high.p:
+                union[-1] = union[-1]._replace(high=piece.high)
         else:
-            found.append(part)
-    return found
+            union.append(piece)
+    return union

@@ -61,15 +61,17 @@ def thresholds(
     lost = report.critical
     if lost is None or report.belt_speed == 0.0:
         return Thresholds(None, "")
-    found = Thresholds(lost.friction, lost.instability)
+    limits = Thresholds(lost.friction, lost.instability)
     if lost.instability != "flutter" or not lost.friction > 0.0:
-        return found
+        return limits
     if not system.smooth:
-        return _told(found, "`brakecli branch` says from where on a vibration can exist on rough pads")
+        return _without_branches(
+            limits, "`brakecli branch` says from where on a vibration can exist on rough pads"
+        )
     if is_undamped(system.coefficients):
-        return _told(found, "no dashpot damps the shoe, so that no vibration is followed below that")
+        return _without_branches(limits, "no dashpot damps the shoe, so that no vibration is followed below that")
     if not system.steady:
-        return _told(found, "speed or load change, so that no vibration is followed below that")
+        return _without_branches(limits, "speed or load change, so that no vibration is followed below that")
     own = report.friction
     highest = UP_TO * lost.friction
     if report.stable:
@@ -87,8 +89,8 @@ def thresholds(
     )
 
 
-def _told(found: Thresholds, why: str) -> Thresholds:
-    return Thresholds(found.critical, found.kind, beside=why)
+def _without_branches(limits: Thresholds, why: str) -> Thresholds:
+    return Thresholds(limits.critical, limits.kind, beside=why)
 
 
 def _beside(answers: Answers, critical: float) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from enum import StrEnum
 from typing import Any, NamedTuple
 
-from brakecli.analysis.regime.decision import Thresholds, told
+from brakecli.analysis.regime.decision import Thresholds, fill
 
 _ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
@@ -187,7 +187,7 @@ class Answers(NamedTuple):
     def sticks(self) -> str:
         """How often the motion sticks."""
         return (
-            told("with stick in {stick_cycles:.0%} of the cycles", self) if self.stick_cycles else "without stick"
+            fill("with stick in {stick_cycles:.0%} of the cycles", self) if self.stick_cycles else "without stick"
         )
 
     @property
@@ -202,7 +202,7 @@ class Answers(NamedTuple):
             bands = f"{self.band_share:.0%} of the energy of vx in three narrow bands"
             apart = self.harmonic_share < Thresholds.harmonic_share and not self.waves
             return bands + ", not multiples of one frequency: a torus, or chaos" * apart
-        return told("{harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
+        return fill("{harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
 
     @property
     def torus(self) -> float:
@@ -220,7 +220,7 @@ class Answers(NamedTuple):
         """What it comes to on the smooth wheel."""
         if not math.isfinite(self.amplitude_without_waves):
             return "no limit cycle that was found"
-        return told("an amplitude of {amplitude_without_waves:.4g} m[ in a cycle of {ends_at:.4g} Hz]", self)
+        return fill("an amplitude of {amplitude_without_waves:.4g} m[ in a cycle of {ends_at:.4g} Hz]", self)
 
     @property
     def ends_at(self) -> float:

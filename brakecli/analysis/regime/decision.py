@@ -85,21 +85,21 @@ class _Known(Formatter):
         return str(super().format_field(value, format_spec))
 
 
-def told(text: str, answers: Any) -> str:
+def fill(text: str, answers: Any) -> str:
     """A text with the numbers of answers; raises UnknownNumberError where one is not known.
 
     What stands in [brackets] is left out then.
     """
     pieces = re.split(_OPTIONAL, text)
-    pieces[1::2] = [_told_or_nothing(piece, answers) for piece in pieces[1::2]]
+    pieces[1::2] = [_fill_or_nothing(piece, answers) for piece in pieces[1::2]]
     pieces[::2] = [_Known(answers).format(piece) for piece in pieces[::2]]
     return "".join(pieces)
 
 
-def _told_or_nothing(text: str, answers: Any) -> str:
+def _fill_or_nothing(text: str, answers: Any) -> str:
     """A text with the numbers of answers, or none where one is not known."""
     try:
-        return told(text, answers)
+        return fill(text, answers)
     except UnknownNumberError:
         return ""
 
@@ -127,8 +127,8 @@ class Row(NamedTuple, Generic[A, T]):
 
     def decision(self, answers: A) -> Decision:
         """What it says of these answers; raises UnknownNumberError where they lack a number that it needs."""
-        reason = told(self.sentence, answers)
-        advice = _told_or_nothing(self.remedy, answers)
+        reason = fill(self.sentence, answers)
+        advice = _fill_or_nothing(self.remedy, answers)
         longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
         return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
 

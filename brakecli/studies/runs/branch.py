@@ -11,7 +11,7 @@ import numpy as np
 from brakecli.analysis.branches.answers import Answers
 from brakecli.analysis.branches.explore import Explorer
 from brakecli.analysis.branches.line import ALONE, Line
-from brakecli.analysis.branches.told import Followed
+from brakecli.analysis.branches.rows import Followed
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.restart import last_of

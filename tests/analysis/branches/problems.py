@@ -5,7 +5,7 @@ from collections.abc import Callable, Hashable
 import numpy as np
 
 from brakecli.analysis.branches.point import Point
-from brakecli.analysis.branches.problem import Array, Doubled, Guess, Problem, Seen
+from brakecli.analysis.branches.problem import Array, Doubled, Evaluation, Guess, Problem
 
 
 class Roots(Problem):
@@ -26,11 +26,11 @@ class Roots(Problem):
         self.word = word
         self.calls = self.with_parameter = 0
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         self.calls += 1
         self.with_parameter += with_parameter
         by_u = np.array(self.by_u(u, p), float)
-        return Seen(
+        return Evaluation(
             gap=np.array(self.f(u, p), float),
             by_u=by_u,
             by_p=np.array(self.by_p(u, p), float) if with_parameter else None,
@@ -59,7 +59,7 @@ class Orbits(Doubled):
     def value(self, p: float) -> float:
         return self.low + p * (self.high - self.low)
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         places = u.reshape(self.k, -1)
         d = places.shape[1]
         gap = np.empty(u.size)
@@ -76,7 +76,7 @@ class Orbits(Doubled):
             by_u[here, there : there + d] -= np.eye(d)
             by_p[here] = by_r * (self.high - self.low)
             maps.append(by_place)
-        return Seen(gap, by_u, by_p if with_parameter else None, np.array(maps), self.k, places.copy())
+        return Evaluation(gap, by_u, by_p if with_parameter else None, np.array(maps), self.k, places.copy())
 
     def doubled(self, point: Point, vector: Array) -> Guess:
         places = point.u.reshape(self.k // 2, -1)
@@ -127,11 +127,11 @@ class Given(Problem):
         self.maps = maps
         self.margin = margin
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         by_p = np.zeros(1) if with_parameter else None
         margins = () if self.margin is None else (self.margin(p),)
         word = bool(margins and margins[0] > 0.0)
-        return Seen(u.copy(), np.eye(1), by_p, np.array([self.maps(p)]), word, None, margins)
+        return Evaluation(u.copy(), np.eye(1), by_p, np.array([self.maps(p)]), word, None, margins)
 
 
 class Scaled(Problem):
@@ -149,12 +149,14 @@ class Scaled(Problem):
         assert isinstance(self.chart, tuple)
         return float(self.chart[0])
 
-    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+    def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
         x = self.origin() + 0.1 * u - 2.0
         q = p - 0.5
         by_u = 0.2 * x[:, None]
         by_p = np.array([2.0 * q]) if with_parameter else None
-        return Seen(x**2 + q**2 - 0.04, by_u, by_p, np.array([np.eye(1) + by_u]), "", self.origin() + 0.1 * u[0])
+        return Evaluation(
+            x**2 + q**2 - 0.04, by_u, by_p, np.array([np.eye(1) + by_u]), "", self.origin() + 0.1 * u[0]
+        )
 
     def renewed(self, point: Point) -> Guess | None:
         if abs(point.u[0]) < 1.0:

@@ -9,7 +9,7 @@ import pytest
 from brakecli.analysis.branches.follow import both_ways, follow
 from brakecli.analysis.branches.newton import Newton, Settings, start
 from brakecli.analysis.branches.point import Branch, Point
-from brakecli.analysis.branches.problem import Array, Problem, Seen
+from brakecli.analysis.branches.problem import Array, Evaluation, Problem
 from tests.analysis.branches.problems import Roots, Scaled
 
 
@@ -100,7 +100,7 @@ def test_a_branch_that_turns_just_beyond_the_range_ends_at_the_range(fold: float
 
 def test_nothing_is_evaluated_outside_the_range() -> None:
     class Careful(Problem):
-        def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+        def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
             assert 0.0 <= p <= 1.0
             return parabola(0.999, -1.0).evaluate(u, p, with_parameter)
 
@@ -215,7 +215,7 @@ def test_a_branch_that_jumps_is_lost_at_the_border() -> None:
 
 def test_a_branch_is_lost_where_the_motion_cannot_be_computed() -> None:
     class Edge(Problem):
-        def evaluate(self, u: Array, p: float, with_parameter: bool) -> Seen | str | None:
+        def evaluate(self, u: Array, p: float, with_parameter: bool) -> Evaluation | str | None:
             return "the shoe has lifted" if p > 0.6 else parabola(0.0).evaluate(u, p, with_parameter)
 
     problem = Edge()

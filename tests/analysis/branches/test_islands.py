@@ -10,7 +10,7 @@ import pytest
 from brakecli.analysis.branches import explore, islands
 from brakecli.analysis.branches import thresholds as module
 from brakecli.analysis.branches.explore import Explorer
-from brakecli.analysis.branches.islands import LARGEST, PARTS, VALUES, places, pushes, tried
+from brakecli.analysis.branches.islands import LARGEST, PARTS, VALUES, places, pushes, try_pushes
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.sliding import Sliding
 from brakecli.analysis.branches.thresholds import FRICTION, Thresholds, thresholds
@@ -127,7 +127,7 @@ def test_a_search_that_is_stopped_has_tried_what_it_says() -> None:
         return len(asked) > FEW
 
     line = line_of(SUBCRITICAL)
-    assert tried(line.shoe(0.1), 0, 2 * FEW, stop).pushes == FEW
+    assert try_pushes(line.shoe(0.1), 0, 2 * FEW, stop).pushes == FEW
     explorer = Explorer(line, lambda *_: None, lambda: True)
     assert explorer.explore(pushes=FEW).search.pushes == 0
 

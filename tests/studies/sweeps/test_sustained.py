@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.branches.answers import Answers
-from brakecli.analysis.branches.begin import settled
 from brakecli.analysis.branches.cycles import Cycles
+from brakecli.analysis.branches.starts import settle
 from brakecli.analysis.fate import fate_on_smooth_pads
 from brakecli.analysis.regime.decision import Decision, Regime
 from brakecli.analysis.regime.verdict import Verdict
@@ -247,6 +247,6 @@ def test_the_vibration_that_lasts_lowest_down_is_handed_on() -> None:
     assert answer.state is not None
     assert answer.at is not None
     assert 0.0 < answer.at - answer.value < 1e-2
-    point = settled(Cycles(line), line.place(answer.at), answer.state, 1.0)
+    point = settle(Cycles(line), line.place(answer.at), answer.state, 1.0)
     assert point is not None
     assert point.stable

@@ -20,7 +20,7 @@ from brakecli.analysis.branches.answers import Answers
 from brakecli.analysis.branches.bar import Bound
 from brakecli.analysis.branches.explore import Explorer, crossing
 from brakecli.analysis.branches.line import Line
-from brakecli.analysis.branches.stable_parts import told_apart
+from brakecli.analysis.branches.stable_parts import separate
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import solve
 from brakecli.solver.method import Method
@@ -208,7 +208,7 @@ def test_motions_of_all_sheets_between_those_that_nearly_meet_last() -> None:
 
 def test_a_window_or_gap_narrower_than_both_its_bars_is_none() -> None:
     def left(*bounds: tuple[float, float]) -> list[float]:
-        return [bound.p for bound in told_apart([Bound(*each) for each in bounds])]
+        return [bound.p for bound in separate([Bound(*each) for each in bounds])]
 
     assert left((0.2, 0.002), (0.201, 0.4), (0.21, 0.01)) == [0.21]
     assert left((0.2, 0.002), (0.203, 0.4), (0.21, 0.01)) == [0.2]

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from brakecli.analysis.branches.begin import settled
 from brakecli.analysis.branches.cycles import Cycles
 from brakecli.analysis.branches.line import Line
+from brakecli.analysis.branches.starts import settle
 from brakecli.analysis.fate import fate_on_smooth_pads
 from tests.analysis.branches.smooth_shoes import FRICTION, cycle_of
 from tests.analysis.test_fate import CRITICAL, HYSTERETIC, of_smooth
@@ -19,7 +19,7 @@ pytestmark = pytest.mark.usefixtures("compiled")
 def test_a_branch_begins_at_the_cycle_that_a_motion_comes_to(friction: float) -> None:
     line = Line(make(HYSTERETIC), [FRICTION], 0.0, 2.0 * CRITICAL)
     p = line.place(friction)
-    point = settled(Cycles(line), p, of_smooth(friction)[1], math.nan)
+    point = settle(Cycles(line), p, of_smooth(friction)[1], math.nan)
     assert point is not None
     assert point.stable
     orbit = fate_on_smooth_pads(*of_smooth(friction)).orbit
@@ -29,4 +29,4 @@ def test_a_branch_begins_at_the_cycle_that_a_motion_comes_to(friction: float) ->
 
 def test_a_motion_that_dies_out_begins_no_branch() -> None:
     line = Line(make(HYSTERETIC), [FRICTION], 0.0, 2.0 * CRITICAL)
-    assert settled(Cycles(line), line.place(0.1), of_smooth(0.1)[1], math.nan) is None
+    assert settle(Cycles(line), line.place(0.1), of_smooth(0.1)[1], math.nan) is None

@@ -72,7 +72,7 @@ class Followed:
         return [mark for mark in self.special if mark.kind in ("end", "budget")]
 
 
-def slid(sliding: Sliding, slides: list[Slide], changes: list[Change]) -> Followed:
+def of_sliding(sliding: Sliding, slides: list[Slide], changes: list[Change]) -> Followed:
     """Steady sliding, and the mode that is the first to grow, or comes nearest to it, followed by continuity.
 
     Multipliers are those of a period of this mode, or of a second.
@@ -110,11 +110,11 @@ def _modes(slide: Slide) -> tuple[Mode, ...]:
 
 def _at_rest(line: Line, slide: Slide, frequency: float) -> Motion:
     """Steady sliding as a motion."""
-    x, y = slide.rest or (None, None)
+    x, y = slide.equilibrium or (None, None)
     return Motion(line.value(slide.p), 0.0, frequency, 0.0, 0.0, lambda: Extent(0.0, 0.0, x, y))
 
 
-def told_of(
+def of_branch(
     line: Line,
     branch: Branch,
     problem: Any,
@@ -136,7 +136,7 @@ def told_of(
         marks.append(_mark(line, Special("flutter", change.p, change.error, points[0], points[0].s), problem))
     for special in specials:
         if special.kind == "end" and special.name == IN_SLIDING and changes:
-            near = min(changes, key=lambda each: abs(each.p - special.p))
+            near = min(changes, key=lambda candidate: abs(candidate.p - special.p))
             marks.append(_mark(line, Special("flutter", near.p, near.error, special.point, special.s), problem))
         else:
             marks.append(_mark(line, special, problem, branch.ended))

@@ -31,7 +31,7 @@ AT_REST = 1e-3
 """Size of a motion, over the compression of the pad, below which it has died out."""
 
 
-def settled(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:
+def settle(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:
     """The cycle that the motion from a state (x, y, v_x, v_y) comes to at p.
 
     None where the motion dies out, or where no cycle is found. On rough shoes the cycle is sought among motions
@@ -57,7 +57,7 @@ def _started(
     problem: Cycles, p: float, state: Array, period: float, scales: Array, time: float, x: float
 ) -> Point | None:
     """The cycle near a state and a period (s), in a chart of these scales, time (s) and size (m)."""
-    u = np.append((state - problem.rest(p)) / scales, period / time)
+    u = np.append((state - problem.equilibrium(p)) / scales, period / time)
     chart = problem.chart_at(u, p, scales, time, x)
     if chart is None:
         return None
@@ -68,32 +68,32 @@ def _started(
 def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:
     """The cycle of a rough shoe whose motion returns to itself."""
     flow = problem.flow(p)
-    rest = problem.rest(p)
+    equilibrium = problem.equilibrium(p)
     period = 1.0 / frequency
     states = [np.array(state, float)]
     for k in range(SETTLE * PARTS + SEEN * LOOKS):
         if flow(states[-1], period * (1.0 / PARTS if k < SETTLE * PARTS else 1.0 / LOOKS), False) != DONE:
             return None
         states = [flow.state] if k < SETTLE * PARTS else [*states, flow.state]
-    seen = np.array(states)
-    size = 0.5 * float(np.ptp(seen[:, :2], axis=0).max())
-    if not size > AT_REST * abs(rest[1]):
+    samples = np.array(states)
+    size = 0.5 * float(np.ptp(samples[:, :2], axis=0).max())
+    if not size > AT_REST * abs(equilibrium[1]):
         return None
     omega = 2.0 * math.pi * frequency
     scales = size * np.array([1.0, 1.0, omega, omega])
-    x = 0.5 * float(np.ptp(seen[:, 0]))
+    x = 0.5 * float(np.ptp(samples[:, 0]))
     belt = problem.line.shoe(p).belt
-    places = [k for k in range(LOOKS) if abs(seen[k, 2] - belt) > CLEAR * abs(belt)]
+    places = [k for k in range(LOOKS) if abs(samples[k, 2] - belt) > CLEAR * abs(belt)]
     tries = 0
     for k in places[:: max(len(places) // PARTS, 1)]:
-        away = np.abs((seen - seen[k]) / scales).max(axis=1)
-        for j in range(k + SOONEST, len(seen) - 1):
+        away = np.abs((samples - samples[k]) / scales).max(axis=1)
+        for j in range(k + SOONEST, len(samples) - 1):
             if not (away[j] < RETURNS and away[j - 1] >= away[j] <= away[j + 1]):
                 continue
             tries += 1
             if tries > TRIES:
                 return None
-            point = _started(problem, p, seen[k], (j - k) / LOOKS * period, scales, period, x)
+            point = _started(problem, p, samples[k], (j - k) / LOOKS * period, scales, period, x)
             if point is not None and point.facts.amplitude > WHOLE * x:
                 return point
     return None
