@@ -7,7 +7,7 @@ import pytest
 
 from brakecli.analysis.regime import evidence
 from brakecli.analysis.regime.classify import classify
-from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.evidence import Stretch
 from brakecli.analysis.regime.measure import Given
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.case.system import system_of
@@ -60,7 +60,7 @@ def test_pieces_of_a_long_history_tell_since_when_something_holds(monkeypatch: p
     values[1, 34] = 1.0
     values[2, [3, 12]] = 1.0
     values[3, 29] = 1.0
-    whole = Part(stacked([history_of(35, x=each) for each in values]), 0, 35)
+    whole = Stretch(stacked([history_of(35, x=each) for each in values]), 0, 35)
     assert whole.since("x", lambda x: x == 0.0).tolist() == [0, 35, 13, 30]
     for row, expected in zip(values, (0, 35, 13, 30), strict=True):
-        assert Part(history_of(35, x=row), 0, 35).since("x", lambda x: x == 0.0) == expected
+        assert Stretch(history_of(35, x=row), 0, 35).since("x", lambda x: x == 0.0) == expected

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from brakecli.analysis.fate import Fate, Kind
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
-from brakecli.analysis.regime.seen import seen
 from brakecli.analysis.regime.spectra import forced_lines
+from brakecli.analysis.regime.statistics import statistics
 from brakecli.solver.history import History
 from brakecli.solver.track import MIN, SLIP, STICK, Events
 from tests.analysis.histories import INTERVAL, classified, history_of, lasting, track_of, verdict_of
@@ -90,7 +90,7 @@ def test_a_shoe_at_rest_has_settled_wherever_it_rests(place: float) -> None:
     late = time > 0.3 * time[-1]
     x = np.where(late, place, 1.5 * place * np.cos(20.0 * time))
     v_x = np.where(late, 0.0, -30.0 * place * np.sin(20.0 * time))
-    [found] = seen([history_of(len(time), x=x, vx=v_x)], Thresholds().settled_within)
+    [found] = statistics([history_of(len(time), x=x, vx=v_x)], Thresholds().settled_within)
     assert 0 < found.settled_from * INTERVAL <= 0.4 * time[-1]
 
 

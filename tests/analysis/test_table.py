@@ -9,7 +9,7 @@ import pytest
 
 from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
-from brakecli.analysis.regime.looks import LOOKS
+from brakecli.analysis.regime.shapes import SHAPES
 from brakecli.analysis.regime.table import CONTACT, ROUGH, SMOOTH, decide
 from tests import sentences
 
@@ -106,7 +106,7 @@ ROUGH_ROWS: dict[str, dict[str, Any]] = {
     "phase not known": {"lyapunov_exponent": -0.1},
     "either": {},
 }
-LOOK_ROWS: dict[str, dict[str, Any]] = {
+SHAPE_ROWS: dict[str, dict[str, Any]] = {
     "limit cycle with stick": {"sticks_without_waves": 1.0, "period_without_waves": 0.01},
     "limit cycle without stick": {"sticks_without_waves": 0.0, "period_without_waves": 0.01},
     "on its way": {**SHAKEN, "growth_rate": 1.0, "level_change": 0.5},
@@ -146,21 +146,21 @@ def test_each_row_of_a_rough_wheel_decides_where_it_holds(row: str) -> None:
     assert ((found.regime, found.excitation) == FORCED) is (row.startswith("forced") or row == "linear, forced")
 
 
-@pytest.mark.parametrize("row", LOOK_ROWS)
+@pytest.mark.parametrize("row", SHAPE_ROWS)
 def test_each_row_of_looks_decides_where_it_holds(row: str) -> None:
-    found = decide(answers(**{**LASTS, **LOOK_ROWS[row]}), LIMITS)
+    found = decide(answers(**{**LASTS, **SHAPE_ROWS[row]}), LIMITS)
     assert found.row.partition(": ")[2] == row
     assert (found.excitation is Excitation.SELF_EXCITED) == (found.regime is not Regime.UNDECIDED)
 
 
 def test_every_row_has_a_record_that_trips_it() -> None:
-    tried = {name.partition(":")[0] for name in (*SMOOTH_ROWS, *ROUGH_ROWS)} | {*LOOK_ROWS}
-    rows = {row.name for row in (*CONTACT, *SMOOTH, *ROUGH, *LOOKS)}
-    assert rows == tried, "write a record of answers for each row into SMOOTH_ROWS, ROUGH_ROWS or LOOK_ROWS"
+    tried = {name.partition(":")[0] for name in (*SMOOTH_ROWS, *ROUGH_ROWS)} | {*SHAPE_ROWS}
+    rows = {row.name for row in (*CONTACT, *SMOOTH, *ROUGH, *SHAPES)}
+    assert rows == tried, "write a record of answers for each row into SMOOTH_ROWS, ROUGH_ROWS or SHAPE_ROWS"
 
 
 def test_the_last_row_of_each_part_always_holds() -> None:
-    for rows in (SMOOTH, ROUGH, LOOKS):
+    for rows in (SMOOTH, ROUGH, SHAPES):
         assert rows[-1].holds(Answers(), LIMITS)
         assert rows[-1].decision(Answers()).reason
 
@@ -169,7 +169,7 @@ def test_no_sentence_has_a_number_that_is_not_known() -> None:
     """Whatever is not known; `sentences.read_all` reads what each record of the tests is told."""
     rng = np.random.default_rng(47)
     numbers = [name for name, value in MOVING._asdict().items() if type(value) is float]
-    records = [{**SHAKEN, **each} for each in ROUGH_ROWS.values()] + [*SMOOTH_ROWS.values(), *LOOK_ROWS.values()]
+    records = [{**SHAKEN, **each} for each in ROUGH_ROWS.values()] + [*SMOOTH_ROWS.values(), *SHAPE_ROWS.values()]
     for record in records:
         for _ in range(20):
             drawn = rng.choice([math.nan, math.inf, -math.inf, 0.5, 0.5, 0.5], len(numbers)).tolist()
@@ -397,7 +397,7 @@ def test_where_theory_does_not_know_the_growth_neighbours_decide_and_say_how_fas
 
 
 def test_a_row_whose_remedy_is_a_longer_run_says_so_to_runs_that_settle() -> None:
-    rows = [*CONTACT, *SMOOTH, *ROUGH, *LOOKS]
+    rows = [*CONTACT, *SMOOTH, *ROUGH, *SHAPES]
     asked = {row.name for row in rows if "run " in row.remedy}
     named = {row.name for row in rows if row.longer}
     assert asked < named

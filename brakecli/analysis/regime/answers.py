@@ -116,18 +116,18 @@ class Answers(NamedTuple):
 
     def known(self) -> dict[str, Any]:
         """What is known, by name: numbers, texts, and 1 for what holds."""
-        kept = {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
+        stored = {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
         return {
             name: str(value) if isinstance(value, str) else float(value)
-            for name, value in kept.items()
+            for name, value in stored.items()
             if isinstance(value, str) or math.isfinite(value)
         }
 
     @classmethod
-    def of(cls, known: Mapping[str, Any]) -> "Answers":
+    def of(cls, stored: Mapping[str, Any]) -> "Answers":
         """The record of what is known by name; what else there is does not matter."""
-        known_as = cls._field_defaults.items()
-        return cls(**{name: type(value)(known[name]) for name, value in known_as if name in known})
+        defaults = cls._field_defaults.items()
+        return cls(**{name: type(value)(stored[name]) for name, value in defaults if name in stored})
 
     def powers(self, rate: float) -> float:
         """Powers of e by which something changes in half of the run."""
@@ -170,8 +170,8 @@ class Answers(NamedTuple):
     @property
     def becomes(self) -> str:
         """What becomes of the vibration on the smooth wheel."""
-        known = self.without_waves is not Continuation.UNKNOWN
-        return f"it {self.without_waves}" if known else "it is not known what it comes to"
+        decided = self.without_waves is not Continuation.UNKNOWN
+        return f"it {self.without_waves}" if decided else "it is not known what it comes to"
 
     @property
     def taken(self) -> float:

@@ -113,18 +113,18 @@ def roughness_gives_most(motion: Answers, limits: Thresholds) -> bool:
     )
 
 
-def _gives_most(one: tuple[float, float], other: tuple[float, float], left: float, limits: Thresholds) -> bool:
+def _gives_most(one: tuple[float, float], other: tuple[float, float], stored: float, limits: Thresholds) -> bool:
     """One gives surely more than `most` times what the other gives and what is left; powers (W) with their errors.
 
     What surely takes energy gives none, and has no error as a giver.
     """
     power, error = one
     beside, doubt = other
-    given = max(beside, 0.0)
-    may_give = max(beside + limits.sure_errors * doubt, 0.0) - given
-    return power - limits.most * given > math.hypot(
+    power_beside = max(beside, 0.0)
+    may_give = max(beside + limits.sure_errors * doubt, 0.0) - power_beside
+    return power - limits.most * power_beside > math.hypot(
         limits.sure_errors * error, limits.most * may_give
-    ) + limits.most * abs(left)
+    ) + limits.most * abs(stored)
 
 
 def balances(motion: Answers, limits: Thresholds) -> bool:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.evidence import Stretch
 from brakecli.analysis.regime.ripple import Ripple, detuned, ripple
 from brakecli.analysis.regime.spectra import forced_lines
 from brakecli.analysis.stability.discrete import spectral_radius, without_damping
@@ -40,8 +40,8 @@ class Context(NamedTuple):
     growth: Callable[[], float] = lambda: 0.0  # 1/s, of a small disturbance of steady sliding; below 0 it decays
     linear: Theory = lambda: None  # the theory of full contact
     steadier: Callable[[], str] = str  # what to do where the steps damp what grows in theory; empty if they do not
-    ripple: Callable[[Part, Sequence[float]], Ripple | None] = lambda part, lines: None  # of the nodes
-    detuned: Callable[[Part, Sequence[float]], float] = lambda part, lines: 0.0  # part of a forced amplitude
+    ripple: Callable[[Stretch, Sequence[float]], Ripple | None] = lambda stretch, lines: None  # of the nodes
+    detuned: Callable[[Stretch, Sequence[float]], float] = lambda stretch, lines: 0.0  # part of a forced amplitude
     radius: float = 1.0  # R, m
     step: float = 0.0  # s; 0 where steps are chosen to keep an error
 
@@ -51,8 +51,8 @@ class Context(NamedTuple):
         strong = _STRONG * max((swing for _, swing in self.waves), default=0.0)
         passing = [frequency for frequency, swing in self.waves if swing > strong]
         turns = abs(self.belt_speed) / (2.0 * math.pi * self.radius)
-        orders = [round(each / turns) for each in passing]
-        whole = all(math.isclose(each, order * turns) for each, order in zip(passing, orders, strict=True))
+        orders = [round(f / turns) for f in passing]
+        whole = all(math.isclose(f, order * turns) for f, order in zip(passing, orders, strict=True))
         slowest = turns * math.gcd(*orders) if whole else min(passing)
         return 1.0 / slowest if passing else 0.0
 
@@ -75,7 +75,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
     theory = theory or theory_of(system)
     turns = tuple(system.wheel.turns.tolist())
     highest = 0.5 / system.interval
-    swings = np.abs(known.waves[:, 0]) if turns and (known := theory()) else np.ones(len(turns))
+    swings = np.abs(linear.waves[:, 0]) if turns and (linear := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
     fastest = compression * system.natural_frequencies[1]
     return Context(
@@ -95,8 +95,8 @@ def context(system: System, theory: Theory | None = None) -> Context:
         growth=lambda: growth(c, stiffness(), c.grip(belt)),
         linear=theory,
         steadier=lambda: _steadier(system),
-        ripple=lambda part, lines: ripple(system, belt, stiffness, part, lines),
-        detuned=lambda part, lines: detuned(system, belt, stiffness, part, lines),
+        ripple=lambda stretch, lines: ripple(system, belt, stiffness, stretch, lines),
+        detuned=lambda stretch, lines: detuned(system, belt, stiffness, stretch, lines),
     )
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import GROUPS, Part, level_change
+from brakecli.analysis.regime.evidence import GROUPS, Stretch, level_change
 from brakecli.analysis.regime.spectra import rises
 from brakecli.analysis.spectrum import Array
 from brakecli.solver.track import LIFT, MIN, SLIP, STICK, TOUCH, Events
@@ -60,17 +60,17 @@ class Cycles:
     force_variation: float | None  # N, peak to peak of the friction force
 
 
-def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
+def cycles_of(stretch: Stretch, events: Events, step: float = 0.0) -> Cycles | None:
     """The cycles of a part by its events; None without cycles.
 
     The spreads hold what a step (s) may change, with which the motion was computed. Stick, loss of contact and
     frequency are medians of ten groups of cycles.
     """
-    begins, lag = _beginnings(part, events)
+    begins, lag = _beginnings(stretch, events)
     if len(begins) <= _FEWEST:
         return None
     cycles = len(begins) - 1
-    interval = part.history.interval
+    interval = stretch.history.interval
     edges = np.linspace(0, cycles, min(cycles, GROUPS) + 1).astype(int)
     groups = begins[edges]
     period, period_spread = median(np.diff(groups) / np.diff(edges))
@@ -90,7 +90,7 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
         "cycles": float(cycles),
         "samples_per_cycle": period / interval,
         "rises_per_cycle": float(lag),
-        **in_lines(part, frequency),
+        **in_lines(stretch, frequency),
         "stick_cycles": float(np.mean(sticks > 0)),
         "stick_episodes_per_cycle": float(np.mean(sticks)),
         "frequency_spread": frequency * period_spread / period,
@@ -111,7 +111,7 @@ def cycles_of(part: Part, events: Events, step: float = 0.0) -> Cycles | None:
         contact_loss_fraction=loss,
         drift=level_change(sizes),
         detuning=level_change(np.diff(begins)),
-        force_variation=_force_variation(part, begins / interval, groups / interval),
+        force_variation=_force_variation(stretch, begins / interval, groups / interval),
     )
 
 
@@ -134,18 +134,18 @@ def contact_time(events: Events, begin: float, end: float) -> float:
     return float(end - begin - away) / touches if touches else np.inf
 
 
-def in_lines(part: Part, frequency: float) -> dict[str, Any]:
+def in_lines(stretch: Stretch, frequency: float) -> dict[str, Any]:
     """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
-    first, *higher = (part.share([n * frequency]) for n in range(1, _HARMONICS + 1))
-    multiples = range(1, 1 + int(0.5 / (frequency * part.history.interval)))
+    first, *higher = (stretch.share([n * frequency]) for n in range(1, _HARMONICS + 1))
+    multiples = range(1, 1 + int(0.5 / (frequency * stretch.history.interval)))
     return {
         "fundamental_share": first,
-        "harmonic_share": part.share([n * frequency for n in multiples]),
+        "harmonic_share": stretch.share([n * frequency for n in multiples]),
         "harmonics": [float(np.sqrt(share / first)) for share in higher if first > 0.0],
     }
 
 
-def _force_variation(part: Part, begins: Array, groups: Array) -> float | None:
+def _force_variation(stretch: Stretch, begins: Array, groups: Array) -> float | None:
     """Peak to peak (N) of the friction force in groups of cycles, as a median; places in samples.
 
     An impact of less than a sample is seen in one of them. None where half of the places in a cycle that samples
@@ -153,12 +153,12 @@ def _force_variation(part: Part, begins: Array, groups: Array) -> float | None:
     """
     edges = begins.astype(int)
     first = groups[:-1].astype(int) - int(begins[0])
-    force = part.history.read("friction_force", edges[0], edges[-1])
+    force = stretch.history.read("friction_force", edges[0], edges[-1])
     unseen, middle = _unseen(begins)
-    place = np.arange(edges[0], edges[-1]) - np.repeat(begins[:-1], np.diff(edges)) + middle
-    odd = np.floor(place / unseen) % 2.0 == 1.0
-    seen = [force, np.where(odd, force, np.nan), np.where(odd, np.nan, force)]
-    varies = [median(np.fmax.reduceat(each, first) - np.fmin.reduceat(each, first))[0] for each in seen]
+    position = np.arange(edges[0], edges[-1]) - np.repeat(begins[:-1], np.diff(edges)) + middle
+    odd = np.floor(position / unseen) % 2.0 == 1.0
+    samples = [force, np.where(odd, force, np.nan), np.where(odd, np.nan, force)]
+    varies = [median(np.fmax.reduceat(values, first) - np.fmin.reduceat(values, first))[0] for values in samples]
     return varies[0] if min(varies) >= _SEEN * varies[0] else None
 
 
@@ -170,19 +170,19 @@ def _unseen(places: Array) -> tuple[float, float]:
     return float(gaps[longest]), float(places[longest] + 0.5 * gaps[longest])
 
 
-def _beginnings(part: Part, events: Events) -> tuple[Array, int]:
+def _beginnings(stretch: Stretch, events: Events) -> tuple[Array, int]:
     """When cycles begin (s), and how many rises of x each holds: after so many the motion repeats.
 
     Rises are told from ripple by the first of `_BANDS` of the level of vx with which it does.
     """
     turning = events.kind <= MIN
-    level = part.deviation("vx")
-    interval = part.history.interval
+    level = stretch.deviation("vx")
+    interval = stretch.history.interval
     time = events.time[turning]
-    mean = np.diff(part.last("x"))
+    mean = np.diff(stretch.last("x"))
     speed = np.diff(events.x[turning]) / np.maximum(np.diff(time), 1e-300)
     everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in _BANDS]
-    for begins in {len(each): each for each in everywhere if len(each) > 1}.values():
+    for begins in {len(times): times for times in everywhere if len(times) > 1}.values():
         rise = max((begins[-1] - begins[0]) / (len(begins) - 1) / interval, 1.0)
         lags = np.arange(1, _MOST_RISES_PER_CYCLE + 1)
         unlike = np.array([_unlike(mean, lag * rise) for lag in lags if lag * rise < len(mean) // 2])

@@ -68,7 +68,7 @@ class UnknownNumberError(Exception):
     """A sentence needs a number that is not known."""
 
 
-class _Known(Formatter):
+class _Writer(Formatter):
     """Writes what is known, by the names of answers."""
 
     def __init__(self, answers: Any) -> None:
@@ -92,7 +92,7 @@ def fill(text: str, answers: Any) -> str:
     """
     pieces = re.split(_OPTIONAL, text)
     pieces[1::2] = [_fill_or_nothing(piece, answers) for piece in pieces[1::2]]
-    pieces[::2] = [_Known(answers).format(piece) for piece in pieces[::2]]
+    pieces[::2] = [_Writer(answers).format(piece) for piece in pieces[::2]]
     return "".join(pieces)
 
 

@@ -39,7 +39,7 @@ def last_quarter(samples: int) -> int:
 
 
 @dataclass(frozen=True)
-class Part:
+class Stretch:
     """The samples start … stop - 1 of a history, read in pieces that fit into memory.
 
     Of many histories at once, most of its numbers are arrays with one for each.
@@ -70,17 +70,17 @@ class Part:
 
     def since(self, name: str, holds: Callable[[Array], NDArray[np.bool_]]) -> Any:
         """The sample from which on something holds of a variable; `stop` where it does not hold at the end."""
-        found: Any = self.start
+        start: Any = self.start
         for begin, piece in zip(range(self.start, self.stop, LONGEST), self.pieces(name), strict=True):
             broken = ~holds(piece)[..., ::-1]
             last = begin + broken.shape[-1] - broken.argmax(axis=-1)
-            found = np.where(broken.any(axis=-1), last, found)
-        return found
+            start = np.where(broken.any(axis=-1), last, start)
+        return start
 
     def extremes(self, name: str) -> tuple[Any, Any]:
         """Least and largest value of a variable."""
         bounds = [
-            (np.minimum.reduce(each, axis=-1), np.maximum.reduce(each, axis=-1)) for each in self.pieces(name)
+            (np.minimum.reduce(piece, axis=-1), np.maximum.reduce(piece, axis=-1)) for piece in self.pieces(name)
         ]
         least, largest = zip(*bounds, strict=True)
         return reduce(np.minimum, least), reduce(np.maximum, largest)
@@ -170,9 +170,9 @@ class Part:
         spectrum = np.fft.rfft(values * np.hanning(len(values)))
         near = _near(lines, np.fft.rfftfreq(len(values), self.history.interval))
         near[: LINE_BINS // 2] = True
-        rest = np.where(near, 0.0, spectrum)
-        share = float(np.linalg.norm(rest)) / max(float(np.linalg.norm(spectrum)), 1e-300)
-        return share, 0.5 * float(np.ptp(np.fft.irfft(rest, len(values))))
+        beside = np.where(near, 0.0, spectrum)
+        share = float(np.linalg.norm(beside)) / max(float(np.linalg.norm(spectrum)), 1e-300)
+        return share, 0.5 * float(np.ptp(np.fft.irfft(beside, len(values))))
 
     def lines(self, forced: Sequence[float], quiet: float = 0.0) -> dict[str, list[float]]:
         """The strongest lines of vx: frequencies (Hz), parts of the energy, and 1 where roughness acts there.
@@ -180,22 +180,22 @@ class Part:
         None where vx (m/s) is quiet: that is rounding.
         """
         frequencies, power, total = self._spectrum
-        left = power.copy()
-        found = list[tuple[float, float, float]]()
+        remaining = power.copy()
+        strongest = list[tuple[float, float, float]]()
         chosen = _near(forced, frequencies)
         total = total if self.amplitude("vx") > quiet else 0.0
-        while total > 0.0 and len(found) < _MOST_LINES:
-            top = int(np.argmax(left))
+        while total > 0.0 and len(strongest) < _MOST_LINES:
+            top = int(np.argmax(remaining))
             near = slice(max(top - LINE_BINS, 0), top + LINE_BINS + 1)
-            share = float(left[near].sum()) / total
+            share = float(remaining[near].sum()) / total
             if share < _LEAST_LINE:
                 break
-            left[near] = 0.0
+            remaining[near] = 0.0
             if top < FEWEST_CYCLES:
                 continue  # a line of fewer cycles is not told from the drift of the mean
-            found.append((interpolated(frequencies, power, top), share, float(chosen[top])))
+            strongest.append((interpolated(frequencies, power, top), share, float(chosen[top])))
         names = ("line_frequencies", "line_shares", "line_forced")
-        return {name: [line[i] for line in found] for i, name in enumerate(names)}
+        return {name: [line[i] for line in strongest] for i, name in enumerate(names)}
 
 
 def _spectrum(values: Array, interval: float) -> tuple[Array, Array, float]:
@@ -226,10 +226,10 @@ def _evenly(count: int) -> tuple[Array, float]:
 def trend(values: Array) -> tuple[Any, Any]:
     """Change of evenly spaced values over their record, by a line of least squares, and its standard error."""
     away, squares = _evenly(values.shape[-1])
-    rest = values - values.mean(axis=-1, keepdims=True)
-    slope = np.vecdot(away, rest) / squares
-    rest = rest - slope[..., None] * away
-    return slope, np.sqrt(np.vecdot(rest, rest) / squares / (values.shape[-1] - 2))
+    residual = values - values.mean(axis=-1, keepdims=True)
+    slope = np.vecdot(away, residual) / squares
+    residual = residual - slope[..., None] * away
+    return slope, np.sqrt(np.vecdot(residual, residual) / squares / (values.shape[-1] - 2))
 
 
 def windowed(values: Array) -> Array:

@@ -8,10 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from brakecli.analysis.regime.answers import QUARTER, Answers, shown_after
-from brakecli.analysis.regime.closed import RELAXED, ROOM, Lasting, forced_linear
 from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
-from brakecli.analysis.regime.evidence import Part, tenths
+from brakecli.analysis.regime.evidence import Stretch, tenths
+from brakecli.analysis.regime.forced_linear import RELAXED, ROOM, Lasting, forced_linear
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.stability.linear import parts
 from brakecli.solver.alike import at_once
@@ -38,20 +38,20 @@ def lasting(
 ) -> list[Lasting]:
     """The numbers of motions that have been decided on."""
     linear = [
-        (each.samples, each.interval, each.linear.belt, each.linear.passing.tobytes())
-        if decision.excitation is Excitation.FORCED and each.linear
+        (motion.samples, motion.interval, motion.linear.belt, motion.linear.passing.tobytes())
+        if decision.excitation is Excitation.FORCED and motion.linear
         else None
-        for each, decision in zip(shown, decisions, strict=True)
+        for motion, decision in zip(shown, decisions, strict=True)
     ]
     closed = at_once(linear, lambda at: forced_linear([shown[i] for i in at], [answers[i].decay for i in at]))
-    found = [_lasting(*each, in_full=in_full) for each in zip(shown, answers, decisions, closed, strict=True)]
+    results = [_lasting(*row, in_full=in_full) for row in zip(shown, answers, decisions, closed, strict=True)]
     forces = at_once(
-        [(each.part.stop, each.part.start, each.force_from) for each in found],
-        lambda at: _forces([shown[i].history for i in at], found[at[0]]),
+        [(numbers.stretch.stop, numbers.stretch.start, numbers.force_from) for numbers in results],
+        lambda at: _forces([shown[i].history for i in at], results[at[0]]),
     )
-    for each, what, decision, force in zip(shown, found, decisions, forces, strict=True):
-        _add_force(each, what, *force, lasts=decision.regime is not Regime.UNDECIDED)
-    return found
+    for motion, what, decision, force in zip(shown, results, decisions, forces, strict=True):
+        _add_force(motion, what, *force, lasts=decision.regime is not Regime.UNDECIDED)
+    return results
 
 
 def _lasting(
@@ -61,127 +61,128 @@ def _lasting(
     forced = decision.excitation is Excitation.FORCED
     lines: Sequence[float] = shown.context.forced if forced else ()
     if forced:
-        found = closed or _forced(shown, answers)
+        numbers = closed or _forced(shown, answers)
     elif decision.excitation is Excitation.SELF_EXCITED and shown.cycles:
-        found = _self_excited(shown, answers, shown.cycles)
+        numbers = _self_excited(shown, answers, shown.cycles)
     else:
-        part = shown.part(shown.half) if answers.linear else shown.judged
+        stretch = shown.stretch(shown.half) if answers.linear else shown.judged
         stays = not answers.moves or answers.carried_along  # all else dies, or is not known
-        found = Lasting(part, answers.settled and stays, part.amplitude("x"))
+        numbers = Lasting(stretch, answers.settled and stays, stretch.amplitude("x"))
         if decision.regime is Regime.DAMPED:  # amplitude and variation are those of the same time
-            found.amplitude = shown.seen.final
-            found.force_from = tenths(shown.samples)[1]
-        return found
-    if forced and found.settled and found.forced is None:  # its neighbours come together: nothing else is left
-        found.forced = found.amplitude
-    if found.cycles and shown.context.forced and _holds_two(shown, found.part):
-        split = found.part.split(shown.context.forced)
-        found.forced, found.own = split if split and split[0] <= split[1] else (None, None)
+            numbers.amplitude = shown.statistics.final
+            numbers.force_from = tenths(shown.samples)[1]
+        return numbers
+    if forced and numbers.settled and numbers.forced is None:  # its neighbours come together: nothing else is left
+        numbers.forced = numbers.amplitude
+    if numbers.cycles and shown.context.forced and _holds_two(shown, numbers.stretch):
+        split = numbers.stretch.split(shown.context.forced)
+        numbers.forced, numbers.own = split if split and split[0] <= split[1] else (None, None)
     if forced and in_full:
-        found.forced_frequency = _wave(shown, found.part)
-    _add_ripple(shown, found, lines)
-    if found.spread is not None and 0.0 < found.amplitude <= found.spread:  # then not even its order is known
-        found.notes["settled"] = found.notes.get("settled") or (_VAGUE if found.settled else None)
-        found.spread = None
-        found.settled = False
-    return found
+        numbers.forced_frequency = _wave(shown, numbers.stretch)
+    _add_ripple(shown, numbers, lines)
+    # where it spreads by as much as itself, not even its order is known
+    if numbers.spread is not None and 0.0 < numbers.amplitude <= numbers.spread:
+        numbers.notes["settled"] = numbers.notes.get("settled") or (_VAGUE if numbers.settled else None)
+        numbers.spread = None
+        numbers.settled = False
+    return numbers
 
 
-def _wave(shown: Shown, part: Part) -> float | None:
+def _wave(shown: Shown, stretch: Stretch) -> float | None:
     """The passing frequency (Hz) of the wave that moves x most; where many pass, of those that should do so."""
     likely = sorted(shown.context.waves, key=lambda wave: -wave[1])[:_LIKELY]
     if not likely:
         return None
-    x, time = part.places()
+    x, time = stretch.places()
     lines = np.exp(-2j * np.pi * np.outer([frequency for frequency, _ in likely], time))
     sizes = np.abs(lines @ ((x - x.mean()) * np.hanning(len(x))))
     return likely[int(np.argmax(sizes))][0]
 
 
-def _holds_two(shown: Shown, part: Part) -> bool:
+def _holds_two(shown: Shown, stretch: Stretch) -> bool:
     """Whether a part holds two periods of the slowest wave."""
     slow = min((frequency for frequency, _ in shown.context.waves), default=0.0)
-    return (part.stop - part.start) * shown.history.interval * slow >= 2.0
+    return (stretch.stop - stretch.start) * shown.history.interval * slow >= 2.0
 
 
 def _forced(shown: Shown, answers: Answers) -> Lasting:
     """A forced motion of a pad that opens: its cycle is the slowest wave, or the slowest beat."""
-    part = shown.judged
+    stretch = shown.judged
     interval = shown.history.interval
     history = shown.history
     rate = -answers.lyapunov_exponent if math.isfinite(answers.lyapunov_exponent) else -shown.context.growth()
     fading = 0.25 * shown.duration * rate < RELAXED  # too slowly to be seen within a quarter of the run
     chaos = answers.lyapunov_exponent > shown.limits.sure_errors * answers.lyapunov_error
-    found = Lasting(part, answers.settled, 0.0)
-    if not found.settled and not fading:
-        found.settled = shown.changes() <= shown.limits.settled_within
-    seconds = (part.stop - part.start) * interval
-    if not chaos and (not found.settled or seconds * rate < RELAXED):
-        found.settled = False
+    numbers = Lasting(stretch, answers.settled, 0.0)
+    if not numbers.settled and not fading:
+        numbers.settled = shown.changes() <= shown.limits.settled_within
+    seconds = (stretch.stop - stretch.start) * interval
+    if not chaos and (not numbers.settled or seconds * rate < RELAXED):
+        numbers.settled = False
         text = "it is not certain that what the shoe adds dies away: run longer"
         if rate > 0.0:
             needed = shown_after(shown.duration, rate)
             text = f"what the shoe adds dies away at only {rate:.3g} 1/s: run at least {needed:.3g} s"
             text += " to see the amplitude that lasts"
-        found.notes["settled"] = text
-    elif found.settled and seconds < (beat := shown.beat()):
-        found.settled = False
-        found.notes["beat"] = f"the waves beat every {beat:.3g} s: run longer"
-    end = part.stop * interval
-    begin = max(part.start * interval, shown.track.since)
+        numbers.notes["settled"] = text
+    elif numbers.settled and seconds < (beat := shown.beat()):
+        numbers.settled = False
+        numbers.notes["beat"] = f"the waves beat every {beat:.3g} s: run longer"
+    end = stretch.stop * interval
+    begin = max(stretch.start * interval, shown.track.since)
     period = max(min(shown.beat(), end - begin), interval)
     edges = np.asarray(end - period * np.arange(int((end - begin) / period), -1, -1), np.float64)
     sizes = swings(shown.events, edges)
-    found.amplitude, spread = median(sizes if len(sizes) else np.array([part.amplitude("x")]))
-    if (found.settled or not fading) and len(edges) >= 3 - found.settled:
-        off = SIZE_OFF * found.amplitude * shown.context.step / contact_time(shown.events, begin, end)
-        found.spread = off + max(spread, _beating(shown, part) * part.amplitude("x") - found.amplitude)
-    _settle_force(shown, found, history.samples)
-    return found
+    numbers.amplitude, spread = median(sizes if len(sizes) else np.array([stretch.amplitude("x")]))
+    if (numbers.settled or not fading) and len(edges) >= 3 - numbers.settled:
+        off = SIZE_OFF * numbers.amplitude * shown.context.step / contact_time(shown.events, begin, end)
+        numbers.spread = off + max(spread, _beating(shown, stretch) * stretch.amplitude("x") - numbers.amplitude)
+    _settle_force(shown, numbers, history.samples)
+    return numbers
 
 
-def _beating(shown: Shown, part: Part) -> float:
+def _beating(shown: Shown, stretch: Stretch) -> float:
     """Amplitude of a longer motion over that of the settled part, as waves beat that force a linear one."""
     if not (theory := shown.context.linear()):
         return 1.0
-    x, time = part.places()
+    x, time = stretch.places()
     (forced,), (lasting,), _ = parts([theory], x[None, ::_SPARSE], time[::_SPARSE])
     return 2.0 * float(forced) / max(float(np.ptp(lasting)), 1e-300)
 
 
-def _settle_force(shown: Shown, found: Lasting, stop: int) -> None:
+def _settle_force(shown: Shown, numbers: Lasting, stop: int) -> None:
     """Find from where on the friction force has settled: it may ring longer than x.
 
     From there on it swings no wider, within pieces of the settled part, than in the last half of them.
     """
-    part = found.part
+    stretch = numbers.stretch
     interval = shown.history.interval
     seconds = max(shown.context.pattern, shown.beat())
-    count = min(int((part.stop - part.start) * interval / seconds), _PIECES) if seconds else 0
+    count = min(int((stretch.stop - stretch.start) * interval / seconds), _PIECES) if seconds else 0
     if count < _FEWEST_PIECES:
         return
-    ends = np.linspace(part.start, stop, count + 1).astype(int).tolist()
-    pieces = (replace(part, start=start, stop=stop) for start, stop in pairwise(ends))
+    ends = np.linspace(stretch.start, stop, count + 1).astype(int).tolist()
+    pieces = (replace(stretch, start=start, stop=stop) for start, stop in pairwise(ends))
     widths = np.array([piece.amplitude("friction_force") for piece in pieces])
     late = widths[count // 2 :]
     first = int(np.flatnonzero(np.append(True, widths > _WIDER * late.max()))[-1])
     if (np.diff(widths[: first + 1]) < 0.0).all():  # not the chance of waves that meet
-        found.force_from = ends[first]
+        numbers.force_from = ends[first]
     if len(late) >= _FEWEST_PIECES and (np.diff(late) < 0.0).all() and late[0] > _WIDER * late[-1]:
-        found.force_rings = shown.duration
+        numbers.force_rings = shown.duration
 
 
 def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     """A vibration that lasts by itself: medians of its cycles, with what a drift becomes in the spreads."""
-    part = shown.judged
+    stretch = shown.judged
     seconds = answers.settled_duration
     interval = shown.history.interval
     rate = 0.0 if answers.undamped else min(abs(answers.growth_rate), shown.context.settles)
     if math.isfinite(answers.rate_without_waves):
         rate = min(rate, answers.rate_without_waves) if answers.waves else answers.rate_without_waves
     lasts = answers.settled and rate * seconds >= RELAXED
-    found = Lasting(part, lasts, cycles.amplitude, cycles=cycles)
-    found.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
+    numbers = Lasting(stretch, lasts, cycles.amplitude, cycles=cycles)
+    numbers.evidence = cycles.evidence | {"stick_cycles": answers.stick_cycles}
     changed = max(_surely(cycles.drift, shown.limits), _surely(cycles.detuning, shown.limits))
     off = abs(cycles.amplitude - answers.amplitude_without_waves)
     turns = answers.period_without_waves * cycles.frequency
@@ -191,7 +192,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     apart = max(nearest / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / _DRIFT)
     far = not apart <= 1.0  # also where it is not known
     if lasts and not (answers.waves or shown.context.step or far) and whole == 1:
-        return _on_orbit(found, shown.fate.orbit)
+        return _on_orbit(numbers, shown.fate.orbit)
     longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if not lasts:
@@ -205,12 +206,12 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     elif changed > _DRIFT:
         text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part: {longer}"
     elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
-        text = f"the waves beat every {beat:.3g} s: run at least {ROOM * (part.start * interval + beat):.3g} s"
+        text = f"the waves beat every {beat:.3g} s: run at least {ROOM * (stretch.start * interval + beat):.3g} s"
         text += " for numbers that last"
-    found.settled = lasts and text is None
-    found.notes["settled"] = text
+    numbers.settled = lasts and text is None
+    numbers.notes["settled"] = text
 
-    def held(spread: float, value: float, drift: tuple[float, float]) -> float | None:
+    def with_drift(spread: float, value: float, drift: tuple[float, float]) -> float | None:
         """A spread with what a drift becomes until small disturbances have changed by a factor of e."""
         if lasts:
             return spread + _surely(drift, shown.limits) * value
@@ -219,41 +220,41 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
         return min(spread + abs(drift[0]) * value / max(min(rate * seconds, 1.0), 1e-9), value)
 
     wander = cycles.evidence["frequency_spread"]
-    spread = held(wander, cycles.frequency, cycles.detuning)
+    spread = with_drift(wander, cycles.frequency, cycles.detuning)
     wander = (wander if spread is None else spread) + cycles.frequency_off
-    found.frequency = cycles.frequency
+    numbers.frequency = cycles.frequency
     if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
-        found.frequency, wander = part.strongest
-        found.evidence |= in_lines(part, found.frequency)
+        numbers.frequency, wander = stretch.strongest
+        numbers.evidence |= in_lines(stretch, numbers.frequency)
     short = seconds < shown.slowest(0.0) or abs(answers.level_change) > shown.limits.settled_within
     if lasts or not short:  # otherwise the run does not show where it ends
-        found.spread = held(cycles.amplitude_spread, cycles.amplitude, cycles.drift)
+        numbers.spread = with_drift(cycles.amplitude_spread, cycles.amplitude, cycles.drift)
     orbit = shown.fate.orbit if not answers.waves and math.isfinite(turns) else None
     if orbit is not None:  # how far the run is from it
-        turns = orbit.period * found.frequency
+        turns = orbit.period * numbers.frequency
         wander += abs(turns - round(turns)) / orbit.period
-        if found.spread is not None and (far or whole == 1):
-            found.spread += off
-        found.evidence["stick_spread"] += abs(cycles.stick_fraction - orbit.stick_fraction)
-        found.evidence["contact_loss_spread"] += abs(cycles.contact_loss_fraction - orbit.contact_loss_fraction)
-    found.evidence["frequency_spread"] = min(wander, found.frequency)
-    return found
+        if numbers.spread is not None and (far or whole == 1):
+            numbers.spread += off
+        numbers.evidence["stick_spread"] += abs(cycles.stick_fraction - orbit.stick_fraction)
+        numbers.evidence["contact_loss_spread"] += abs(cycles.contact_loss_fraction - orbit.contact_loss_fraction)
+    numbers.evidence["frequency_spread"] = min(wander, numbers.frequency)
+    return numbers
 
 
-def _on_orbit(found: Lasting, orbit: Orbit | None) -> Lasting:
+def _on_orbit(numbers: Lasting, orbit: Orbit | None) -> Lasting:
     """The numbers of a motion that follows the equations and has come to its orbit: those of the orbit.
 
     A scheme at a step has a motion of its own, which samples show.
     """
     if orbit is not None:
-        found.orbit = orbit
-        found.frequency = orbit.frequency
-        found.spread = orbit.error * orbit.amplitude
-        found.evidence["frequency_spread"] = orbit.error * orbit.frequency
+        numbers.orbit = orbit
+        numbers.frequency = orbit.frequency
+        numbers.spread = orbit.error * orbit.amplitude
+        numbers.evidence["frequency_spread"] = orbit.error * orbit.frequency
         graze = math.sqrt(orbit.error)  # part of a period in a phase that only just comes about
-        found.evidence["stick_spread"] = graze
-        found.evidence["contact_loss_spread"] = graze
-    return found
+        numbers.evidence["stick_spread"] = graze
+        numbers.evidence["contact_loss_spread"] = graze
+    return numbers
 
 
 def _surely(change: tuple[float, float], limits: Thresholds) -> float:
@@ -261,47 +262,47 @@ def _surely(change: tuple[float, float], limits: Thresholds) -> float:
     return abs(change[0]) if abs(change[0]) > limits.sure_errors * change[1] else 0.0
 
 
-def _add_ripple(shown: Shown, found: Lasting, lines: Sequence[float]) -> None:
+def _add_ripple(shown: Shown, numbers: Lasting, lines: Sequence[float]) -> None:
     """What nodes and steps change in a motion forced on lines (Hz), or in one that lasts by itself."""
     context = shown.context
-    part = found.part
-    opens = shown.seen.full_from > part.start  # otherwise it has none
-    ripple = context.ripple(part, lines) if opens and not found.cycles else None
-    if found.spread is not None and lines and not (shown.linear and found.forced == found.amplitude):
-        found.spread += found.amplitude * context.detuned(part, lines) + (ripple.size if ripple else 0.0)
+    stretch = numbers.stretch
+    opens = shown.statistics.full_from > stretch.start  # otherwise it has none
+    ripple = context.ripple(stretch, lines) if opens and not numbers.cycles else None
+    if numbers.spread is not None and lines and not (shown.linear and numbers.forced == numbers.amplitude):
+        numbers.spread += numbers.amplitude * context.detuned(stretch, lines) + (ripple.size if ripple else 0.0)
     if ripple and ripple.counts:
-        found.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
-        found.longer &= not found.settled
-        found.notes["ripple"] = ripple.sentence
-        found.settled = False
+        numbers.evidence |= {f"ripple_{name}": getattr(ripple, name) for name in ("x", "vx", "force")}
+        numbers.longer &= not numbers.settled
+        numbers.notes["ripple"] = ripple.sentence
+        numbers.settled = False
 
 
 def _forces(histories: Sequence[History], alike: Lasting) -> list[tuple[float, float]]:
     """Mean and variation (N, peak to peak) of the friction force in the settled part, which all have in common."""
-    part = replace(alike.part, history=stacked(histories))
-    low, high = replace(part, start=max(part.start, alike.force_from)).extremes("friction_force")
-    return [*zip(part.mean("friction_force").tolist(), (high - low).tolist(), strict=True)]
+    stretch = replace(alike.stretch, history=stacked(histories))
+    low, high = replace(stretch, start=max(stretch.start, alike.force_from)).extremes("friction_force")
+    return [*zip(stretch.mean("friction_force").tolist(), (high - low).tolist(), strict=True)]
 
 
-def _add_force(shown: Shown, found: Lasting, mean: float, variation: float, *, lasts: bool) -> None:
+def _add_force(shown: Shown, numbers: Lasting, mean: float, variation: float, *, lasts: bool) -> None:
     """Add mean and variation of the friction force, and why it is missing or may be too small."""
     interval = shown.interval
     pattern = shown.context.pattern
-    seconds = (shown.samples - max(found.part.start, found.force_from)) * interval
-    found.mean_force = mean
-    found.variation = variation
-    if found.cycles:
-        found.variation = found.cycles.force_variation
-        if found.variation is None:
+    seconds = (shown.samples - max(numbers.stretch.start, numbers.force_from)) * interval
+    numbers.mean_force = mean
+    numbers.variation = variation
+    if numbers.cycles:
+        numbers.variation = numbers.cycles.force_variation
+        if numbers.variation is None:
             finer = f"give an output.sample_interval of {_FINER * interval:.2g} s"
             text = f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
-            found.notes["torque_variation"] = text
-    elif found.force_rings is not None:
-        found.variation = None
-        longer = QUARTER * (shown.duration + found.force_rings)
+            numbers.notes["torque_variation"] = text
+    elif numbers.force_rings is not None:
+        numbers.variation = None
+        longer = QUARTER * (shown.duration + numbers.force_rings)
         text = f"the friction force still rings, and torque_variation is missing: run at least {longer:.3g} s"
-        found.notes["torque_variation"] = text
+        numbers.notes["torque_variation"] = text
     elif lasts and shown.context.steady and seconds < _WHOLE * pattern:
-        found.notes["torque_variation"] = (
+        numbers.notes["torque_variation"] = (
             f"torque_variation needs {pattern:.3g} s, until the waves repeat: run longer"
         )

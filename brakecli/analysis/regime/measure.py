@@ -13,9 +13,9 @@ from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, Part, last_quarter, windowed
-from brakecli.analysis.regime.seen import Seen
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, Stretch, last_quarter, windowed
 from brakecli.analysis.regime.spectra import MULTIPLES
+from brakecli.analysis.regime.statistics import Statistics
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.phases import STICK
@@ -40,34 +40,36 @@ class Given(NamedTuple):
 class Shown:
     """What a history shows."""
 
-    def __init__(self, given: Given, seen: Seen, limits: Thresholds) -> None:
+    def __init__(self, motion: Given, statistics: Statistics, limits: Thresholds) -> None:
         """Take a motion, and what all its samples show."""
-        self.history, self.context, *_ = self.given = given
-        self.seen = seen
+        self.history, self.context, *_ = self.motion = motion
+        self.statistics = statistics
         self.limits = limits
-        self.track = given.track
+        self.track = motion.track
         self.samples = self.history.samples
         self.interval = self.history.interval
         self.duration = self.samples * self.interval
         self.half, self.quarter = self.samples // 2, last_quarter(self.samples)
-        self.judged_from = seen.settled_from or self.half
+        self.judged_from = statistics.settled_from or self.half
 
-    def part(self, start: int) -> Part:
+    def stretch(self, start: int) -> Stretch:
         """The samples from one on."""
-        return Part(self.history, start, self.samples)
+        return Stretch(self.history, start, self.samples)
 
     @cached_property
-    def judged(self) -> Part:
+    def judged(self) -> Stretch:
         """The settled part, or the second half."""
-        return self.part(self.judged_from)
+        return self.stretch(self.judged_from)
 
     def stays(self, state: ContactState, start: int) -> bool:
         """Whether the contact is in a state from a sample on."""
-        return self.seen.state == state and self.seen.state_from <= start
+        return self.statistics.state == state and self.statistics.state_from <= start
 
-    def fraction(self, state: ContactState, part: Part) -> float:
+    def fraction(self, state: ContactState, stretch: Stretch) -> float:
         """Part of the samples in a state of the contact, which mostly does not change any more."""
-        return float(self.seen.state == state) if self.seen.state_from <= part.start else part.fraction(state)
+        if self.statistics.state_from <= stretch.start:
+            return float(self.statistics.state == state)
+        return stretch.fraction(state)
 
     @cached_property
     def linear(self) -> Linear | None:
@@ -77,13 +79,13 @@ class Shown:
         if theory is None:
             return None
         start = max(min(self.quarter, self.samples - int(slow / self.interval)), 0)
-        slides = self.seen.full_from <= start and (theory.slip is None or self.stays(theory.slip, start))
+        slides = self.statistics.full_from <= start and (theory.slip is None or self.stays(theory.slip, start))
         return theory if slides or theory.stays(self.end[1]) else None
 
     @property
     def brief(self) -> bool:
         """Whether it fails, changes or is too short, so that little is asked of it."""
-        return self.samples < FEWEST_SAMPLES or not self.context.steady or bool(self.given.failure)
+        return self.samples < FEWEST_SAMPLES or not self.context.steady or bool(self.motion.failure)
 
     @property
     def enough(self) -> bool:
@@ -100,7 +102,7 @@ class Shown:
     @cached_property
     def fate(self) -> Fate:
         """What the motion comes to on the smooth wheel."""
-        return self.given.continued()
+        return self.motion.continued()
 
     @cached_property
     def cycles(self) -> Cycles | None:
@@ -128,9 +130,9 @@ class Shown:
     @cached_property
     def _before(self) -> NDArray[np.float64]:
         """Level of vx and amplitude of x in the third quarter, over those in the last one."""
-        before = Part(self.history, self.half, 3 * self.samples // 4)
+        before = Stretch(self.history, self.half, 3 * self.samples // 4)
         sizes = np.array([before.deviation("vx"), before.amplitude("x")])
-        return sizes / np.maximum([self.seen.level, self.seen.amplitude], 1e-300)
+        return sizes / np.maximum([self.statistics.level, self.statistics.amplitude], 1e-300)
 
     def changes(self) -> float:
         """By which part vx or x, whichever does more so, swings otherwise in the last quarter than before."""
@@ -146,15 +148,15 @@ class Shown:
         What dashpots and scheme leave of both is nothing where the motion has settled.
         """
         begin = self.judged_from * self.interval
-        given = windowed(self.track.given(begin, self.judged.mean("friction_force")))
-        powers = given[:, :3] / given[:, 3:]
-        friction, roughness, left = powers.mean(axis=0).tolist()
+        energies = windowed(self.track.given(begin, self.judged.mean("friction_force")))
+        powers = energies[:, :3] / energies[:, 3:]
+        friction, roughness, stored = powers.mean(axis=0).tolist()
         friction_error, roughness_error, _ = (powers.std(axis=0) / 2.0).tolist()
         closing = abs(self.track.powers(begin, self.duration).closing)
         return {
             "power_of_friction": friction,
             "power_of_roughness": roughness,
-            "power_stored": left,
+            "power_stored": stored,
             "power_of_friction_error": max(friction_error, closing),
             "power_of_roughness_error": max(roughness_error, closing),
         }
@@ -171,12 +173,12 @@ def _beat(counts: tuple[float, ...]) -> float:
 def answers(shown: Shown) -> Answers:
     """The record of answers; what the motion comes to is asked only where a row may need it."""
     context = shown.context
-    seen = shown.seen
-    exponent = shown.given.exponent
-    failure = shown.given.failure
+    statistics = shown.statistics
+    exponent = shown.motion.exponent
+    failure = shown.motion.failure
     stands = context.belt_speed == 0.0
     waves = bool(context.forced)
-    found: dict[str, Any] = {
+    facts: dict[str, Any] = {
         "failure": failure,
         "duration": shown.duration,
         "samples": shown.samples,
@@ -194,36 +196,36 @@ def answers(shown: Shown) -> Answers:
         "carried_along": shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
     }
     if exponent is not None:
-        found |= {
+        facts |= {
             "lyapunov_exponent": exponent.rate,
             "lyapunov_by_line": exponent.even,
             "lyapunov_by_line_error": exponent.even_error,
         }
     if shown.brief:
-        return Answers(**found)
-    found |= {
-        "moves": seen.largest_level > context.quiet,
-        "slowest_wave_period": shown.slowest(seen.swing),
-        "level_change": seen.change,
-        "level_change_error": seen.change_error,
-        "amplitude": seen.amplitude,
-        "level": seen.level,
-        "settled": seen.settled_from > 0,
+        return Answers(**facts)
+    facts |= {
+        "moves": statistics.largest_level > context.quiet,
+        "slowest_wave_period": shown.slowest(statistics.swing),
+        "level_change": statistics.change,
+        "level_change_error": statistics.change_error,
+        "amplitude": statistics.amplitude,
+        "level": statistics.level,
+        "settled": statistics.settled_from > 0,
         "settled_duration": (shown.samples - shown.judged_from) * shown.interval,
     }
     if exponent is not None:
-        drift = 0.0 if found["settled"] else shown.drift()
-        passing = 0.0 if _lasts(shown, Answers(**found)) else max(exponent.rate, 0.0)  # what grows on the way only
-        found["lyapunov_error"] = math.hypot(exponent.error, drift, passing)
+        drift = 0.0 if facts["settled"] else shown.drift()
+        passing = 0.0 if _lasts(shown, Answers(**facts)) else max(exponent.rate, 0.0)  # what grows on the way only
+        facts["lyapunov_error"] = math.hypot(exponent.error, drift, passing)
     if (theory := shown.linear) is not None:
-        found |= {"linear": True, "ringing_frequency": theory.mode.frequency}
+        facts |= {"linear": True, "ringing_frequency": theory.mode.frequency}
         if math.isfinite(theory.known_to):  # otherwise only neighbours tell
-            found |= {"growth_rate": theory.mode.growth, "growth_rate_error": theory.known_to}
+            facts |= {"growth_rate": theory.mode.growth, "growth_rate_error": theory.known_to}
         if theory.direction > 0:
-            found |= {"time_to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
+            facts |= {"time_to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
     else:
-        found |= _of_more(shown, waves)
-    return Answers(**found)
+        facts |= _of_more(shown, waves)
+    return Answers(**facts)
 
 
 def of_fate(fate: Fate) -> dict[str, Any]:
@@ -242,26 +244,26 @@ def of_fate(fate: Fate) -> dict[str, Any]:
     }
 
 
-def _lasts(shown: Shown, found: Answers) -> bool:
+def _lasts(shown: Shown, record: Answers) -> bool:
     """Whether disturbances will grow as they do: they fade from a linear motion, or the level surely stays."""
     theory = shown.linear
     fades = theory is not None and theory.direction < 0
-    return fades or abs(found.level_change) <= shown.limits.sure_errors * found.level_change_error
+    return fades or abs(record.level_change) <= shown.limits.sure_errors * record.level_change_error
 
 
 def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
     """What has to be known of a motion that is not linear."""
     context = shown.context
-    found = dict[str, Any](growth_rate=shown.context.growth())
+    facts = dict[str, Any](growth_rate=shown.context.growth())
     if not context.frictionless:
-        found |= of_fate(shown.fate)
+        facts |= of_fate(shown.fate)
     if waves:
-        found |= shown.powers() | {"touches_in_sliding": context.touches()}
+        facts |= shown.powers() | {"touches_in_sliding": context.touches()}
     if cycles := shown.cycles:
         names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
-        found |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}
+        facts |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}
         if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
-            found["band_share"] = shown.judged.narrow()
+            facts["band_share"] = shown.judged.narrow()
         if context.step:
-            found["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
-    return found
+            facts["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
+    return facts

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.regime.evidence import Part
+from brakecli.analysis.regime.evidence import Stretch
 from brakecli.analysis.stability.modes import first_order, stiffness_matrix
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.steady_sliding import forces_along
@@ -50,23 +50,23 @@ class Ripple(NamedTuple):
 
 
 def ripple(
-    system: System, belt: float, stiffness_of: Callable[[], float], part: Part, lines: Sequence[float]
+    system: System, belt: float, stiffness_of: Callable[[], float], stretch: Stretch, lines: Sequence[float]
 ) -> Ripple | None:
     """The ripple in the last samples of a part, at a mean stiffness (N/m); None where it is not known.
 
     Where the part is forced on `lines` (Hz), what lies beside them is ripple: the mean stiffness of an open pad
     may miss a resonance.
     """
-    samples = min(part.stop - part.start, _MOST_SAMPLES)
-    end = Part(part.history, part.stop - samples, part.stop)
+    samples = min(stretch.stop - stretch.start, _MOST_SAMPLES)
+    end = Stretch(stretch.history, stretch.stop - samples, stretch.stop)
     work = samples * _FINER * system.nodes * len(system.wheel.g)
     if samples < _FEWEST or not 0 < work <= _MOST_WORK or system.method.step is None or end.touches():
         return None
     pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
     layer = build_layer(system.evaluator, pad, moving=True)
     names = ("x", "y", "vx", "normal_force")
-    x, y, v_x, force = (part.history.read(name, end.start, end.stop) for name in names)
-    travel = belt * part.history.interval * np.arange(end.start, end.stop) - x
+    x, y, v_x, force = (stretch.history.read(name, end.start, end.stop) for name in names)
+    travel = belt * stretch.history.interval * np.arange(end.start, end.stop) - x
     finer = np.zeros(samples)
     forces_along(np.ascontiguousarray(y), travel, *layer, finer)
     stiffness = stiffness_of()
@@ -74,8 +74,8 @@ def ripple(
     window = np.hanning(samples)
     added = force - finer
     grip = c.grip(belt)
-    omega = 2.0 * math.pi * np.fft.rfftfreq(samples, part.history.interval)
-    off, *seen = (np.fft.rfft((each - each.mean()) * window) for each in (added, x, v_x, force))
+    omega = 2.0 * math.pi * np.fft.rfftfreq(samples, stretch.history.interval)
+    off, *wholes = (np.fft.rfft((signal - signal.mean()) * window) for signal in (added, x, v_x, force))
     (s_xx, s_xy), (s_yx, s_yy) = stiffness_matrix(c, stiffness, grip)
     a = s_xx - c.m * omega**2 + 1j * omega * c.b_xx
     b = s_xy + 1j * omega * c.b_xy
@@ -87,11 +87,13 @@ def ripple(
     pressed = off - stiffness * (a - grip * d) / determinant * off
     in_x, in_vx, in_force = (
         min(float(np.linalg.norm(ours) / size), 1.0) if (size := np.linalg.norm(whole)) else 0.0
-        for ours, whole in zip((shaken, 1j * omega * shaken, pressed), seen, strict=True)
+        for ours, whole in zip((shaken, 1j * omega * shaken, pressed), wholes, strict=True)
     )
     swing = 0.5 * float(np.ptp(np.fft.irfft(shaken, samples)))
     if lines and max(in_x, in_vx, in_force) >= _LEAST:
-        (beside, own), (vx, _), (pressing, _) = (part.beside(name, lines) for name in ("x", "vx", "normal_force"))
+        (beside, own), (vx, _), (pressing, _) = (
+            stretch.beside(name, lines) for name in ("x", "vx", "normal_force")
+        )
         in_x = max(in_x, beside)
         in_vx = max(in_vx, vx)
         in_force = max(in_force, pressing)
@@ -100,7 +102,7 @@ def ripple(
 
 
 def detuned(
-    system: System, belt: float, stiffness: Callable[[], float], part: Part, lines: Sequence[float]
+    system: System, belt: float, stiffness: Callable[[], float], stretch: Stretch, lines: Sequence[float]
 ) -> float:
     """Part of the amplitude of a motion forced on `lines` (Hz) by which the step may move it past resonances.
 
@@ -109,15 +111,15 @@ def detuned(
     if system.method.own_steps or system.method.step is None or not lines:
         return 0.0
     c = system.coefficients
-    x = part.last("x")
+    x = stretch.last("x")
     ordered = np.unique(lines)
     size = np.abs(np.fft.rfft(x * np.hanning(len(x)))[1:]) ** 2
-    found = np.fft.rfftfreq(len(x), part.history.interval)[1:]
-    energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), found), size, len(ordered))
-    held = np.minimum(_STIFFNESSES * stiffness(), system.contact_stiffness)
+    frequencies = np.fft.rfftfreq(len(x), stretch.history.interval)[1:]
+    energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), frequencies), size, len(ordered))
+    stiffnesses = np.minimum(_STIFFNESSES * stiffness(), system.contact_stiffness)
     grip = c.grip(belt)
     omega = 2.0 * math.pi * ordered[:, None, None]
-    values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, each, grip) / c.m) for each in held])
+    values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, k, grip) / c.m) for k in stiffnesses])
     beside = (omega / np.maximum(np.abs(1j * omega - values), 1e-9 * omega)).sum(axis=2).max(axis=1)
     change = (omega[:, 0, 0] * system.step) ** 2 * (0.25 + beside / 12.0)
     return float(np.sqrt(energy @ change**2 / max(energy.sum(), 1e-300)))

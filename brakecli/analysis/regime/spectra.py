@@ -23,15 +23,15 @@ def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
 
 def line_share(power: Array) -> float:
     """Part of the energy in the three strongest bands, each 6 % to either side."""
-    left = power.copy()
+    remaining = power.copy()
     total = float(power.sum())
-    found = 0.0
+    energy = 0.0
     for _ in range(_BANDS):
-        peak = int(np.argmax(left))
+        peak = int(np.argmax(remaining))
         band = slice(int(peak / _WIDE), int(peak * _WIDE) + 2)
-        found += float(left[band].sum())
-        left[band] = 0.0
-    return found / total if total > 0.0 else 0.0
+        energy += float(remaining[band].sum())
+        remaining[band] = 0.0
+    return energy / total if total > 0.0 else 0.0
 
 
 @lru_cache(maxsize=4)  # the points of a sweep ask for the same ones
@@ -43,6 +43,6 @@ def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest:
     base = abs(belt_speed) * np.array(waves_per_metre)
     few = base[: len(base) * (len(base) <= _MOST_PAIRED)]
     multiples = np.outer(np.arange(1, MULTIPLES + 1), base)
-    found = [multiples, np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
-    lines = np.unique(np.concatenate([each.ravel() for each in found]))
+    families = [multiples, np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
+    lines = np.unique(np.concatenate([family.ravel() for family in families]))
     return tuple(lines[(lines > 0.0) & (lines <= highest)].tolist())

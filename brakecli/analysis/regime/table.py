@@ -1,7 +1,7 @@
 """The table: what is said of a motion, by one record of answers. Nothing here looks at a history.
 
 Rows are tried from the top, and the first whose condition holds decides; the last one always does. A row that
-says that the motion lasts by itself leaves it to the rows of `LOOKS` how it looks.
+says that the motion lasts by itself leaves it to the rows of `SHAPES` how it looks.
 """
 
 import math
@@ -24,7 +24,7 @@ from brakecli.analysis.regime.conditions import (
     together,
 )
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Row, Thresholds, first
-from brakecli.analysis.regime.looks import LOOKS
+from brakecli.analysis.regime.shapes import SHAPES
 
 _DAMPED = Regime.DAMPED
 _DASHPOT = "a dashpot would decide"
@@ -194,7 +194,7 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
         "lasts",
         lambda motion, limits: motion.without_waves == Continuation.LASTS and same(motion, limits),
         "the vibration lasts[: continued, it comes to an amplitude of {amplitude_without_waves:.3g} m]",
-        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        regime=Regime.UNDECIDED,  # how it looks, `SHAPES` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
@@ -203,14 +203,14 @@ SMOOTH: tuple[Row[Answers, Thresholds], ...] = (
             motion.without_waves == Continuation.LASTS and math.isfinite(motion.amplitude_without_waves)
         ),
         "the vibration lasts, and is still on its way to an amplitude of {amplitude_without_waves:.3g} m",
-        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        regime=Regime.UNDECIDED,  # how it looks, `SHAPES` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
         "lasts, irregular",
         lambda motion, limits: motion.without_waves == Continuation.LASTS and steady(motion, limits),
         "the vibration lasts, as sliding is unstable, and its level does not change",
-        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        regime=Regime.UNDECIDED,  # how it looks, `SHAPES` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     COMES_AND_GOES,
@@ -343,7 +343,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         ),
         "the vibration lasts without the roughness, with a phase of its own"
         "[ (a torus: {torus:.4g} Hz and the frequencies of the waves are incommensurate)]",
-        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        regime=Regime.UNDECIDED,  # how it looks, `SHAPES` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
@@ -356,7 +356,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
             and friction_gives_most(motion, limits)
         ),
         "the vibration lasts without the roughness at the same level, and is locked to it",
-        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        regime=Regime.UNDECIDED,  # how it looks, `SHAPES` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     Row(
@@ -370,7 +370,7 @@ ROUGH: tuple[Row[Answers, Thresholds], ...] = (
         ),
         "the vibration lasts without the roughness, and of its power friction gives "
         "{power_of_friction:.2g} W and the roughness {power_of_roughness:.2g} W",
-        regime=Regime.UNDECIDED,  # how it looks, `LOOKS` decides
+        regime=Regime.UNDECIDED,  # how it looks, `SHAPES` decides
         excitation=Excitation.SELF_EXCITED,
     ),
     COMES_AND_GOES,
@@ -412,8 +412,8 @@ _WITHOUT = (*CONTACT, *SMOOTH)
 
 def decide(answers: Answers, thresholds: Thresholds) -> Decision:
     """What the first row says whose condition holds."""
-    found = first(_WITH_WAVES if answers.waves else _WITHOUT, answers, thresholds)
-    if found.excitation is not Excitation.SELF_EXCITED:
-        return found
-    look = first(LOOKS, answers, thresholds)
-    return look._replace(reason=f"{found.reason}, {look.reason}", row=f"{found.row}: {look.row}")
+    decision = first(_WITH_WAVES if answers.waves else _WITHOUT, answers, thresholds)
+    if decision.excitation is not Excitation.SELF_EXCITED:
+        return decision
+    look = first(SHAPES, answers, thresholds)
+    return look._replace(reason=f"{decision.reason}, {look.reason}", row=f"{decision.row}: {look.row}")

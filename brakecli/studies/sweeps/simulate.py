@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from brakecli.analysis.regime.classify import classify, look, verdicts
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, Part, last_quarter
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, Stretch, last_quarter
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability.linear import Theory, theories_of
 from brakecli.case.case import Case
@@ -93,7 +93,7 @@ def may_suffice(motion: Motion) -> bool:
     Where the pad opens to the last, it is not linear: `judged_together` would have it computed alone.
     """
     samples = len(motion.rows)
-    quarter = Part(array_history(motion.system.interval, motion.rows), last_quarter(samples), samples)
+    quarter = Stretch(array_history(motion.system.interval, motion.rows), last_quarter(samples), samples)
     return samples < FEWEST_SAMPLES or quarter.touches()
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from brakecli.analysis.regime.answers import LONGER
 from brakecli.analysis.regime.cycles import Cycles
-from brakecli.analysis.regime.evidence import LAST, WINDOWS, Part, trend
+from brakecli.analysis.regime.evidence import LAST, WINDOWS, Stretch, trend
 from brakecli.analysis.regime.measure import Shown
 from brakecli.analysis.spectrum import Array
 from brakecli.analysis.stability.linear import Linear, force_parts, parts
@@ -28,7 +28,7 @@ ROOM = 1.05  # a requested run is longer than needed by this, so that it holds w
 class Lasting:
     """The numbers of the settled part, in SI units; None where one is not known."""
 
-    part: Part
+    stretch: Stretch
     settled: bool
     amplitude: float
     spread: float | None = None
@@ -52,36 +52,39 @@ def forced_linear(shown: Sequence[Shown], decays: Sequence[float]) -> list[Lasti
 
     None where the waves force more than the closed form has.
     """
-    theories = [each.linear for each in shown if each.linear]
+    theories = [motion.linear for motion in shown if motion.linear]
     x, time = _whole(shown).places()
     forced, lasting, own = parts(theories, x, time)
-    found = [*map(_closed, shown, theories, decays, forced.tolist(), _gone(shown, decays, own, forced))]
-    if settled := [each for each in zip(found, shown, decays, strict=True) if each[0] and each[0].settled]:
+    results = [*map(_closed, shown, theories, decays, forced.tolist(), _gone(shown, decays, own, forced))]
+    if settled := [row for row in zip(results, shown, decays, strict=True) if row[0] and row[0].settled]:
         _settle_force(*zip(*settled, strict=True))
-    starts = [each and int(time.searchsorted(each.part.start * each.part.history.interval)) for each in found]
+    starts = [
+        numbers and int(time.searchsorted(numbers.stretch.start * numbers.stretch.history.interval))
+        for numbers in results
+    ]
     added = at_once(starts, lambda at: (0.5 * np.ptp(own[at, starts[at[0]] :], axis=1)).tolist())
-    for each, swing, adds in zip(found, (0.5 * np.ptp(lasting, axis=1)).tolist(), added, strict=True):
-        if each is not None:
-            each.own = adds
-            each.spread = adds + each.amplitude - swing if each.settled else None
-    return found
+    for numbers, swing, adds in zip(results, (0.5 * np.ptp(lasting, axis=1)).tolist(), added, strict=True):
+        if numbers is not None:
+            numbers.own = adds
+            numbers.spread = adds + numbers.amplitude - swing if numbers.settled else None
+    return results
 
 
-def _settle_force(found: Sequence[Lasting], shown: Sequence[Shown], decays: Sequence[float]) -> None:
+def _settle_force(results: Sequence[Lasting], shown: Sequence[Shown], decays: Sequence[float]) -> None:
     """Find from where on the friction forces have settled: y may ring longer than x."""
-    theories = [each.linear for each in shown if each.linear]
+    theories = [motion.linear for motion in shown if motion.linear]
     forced, rings = force_parts(theories, *_whole(shown).places("y"))
     gone = _gone(shown, decays, rings, forced)
-    for each, theory, decay, left in zip(found, theories, decays, gone, strict=True):
-        if left.window <= WINDOWS - LAST:
-            each.force_from = left.window * each.part.stop // WINDOWS
+    for numbers, theory, decay, remainder in zip(results, theories, decays, gone, strict=True):
+        if remainder.window <= WINDOWS - LAST:
+            numbers.force_from = remainder.window * numbers.stretch.stop // WINDOWS
         elif theory.slip is not None:
-            each.force_rings = _wait(decay, left)
+            numbers.force_rings = _wait(decay, remainder)
 
 
-def _whole(shown: Sequence[Shown]) -> Part:
+def _whole(shown: Sequence[Shown]) -> Stretch:
     """All samples of many histories."""
-    return Part(stacked([each.history for each in shown]), 0, shown[0].samples)
+    return Stretch(stacked([motion.history for motion in shown]), 0, shown[0].samples)
 
 
 class _Gone(NamedTuple):
@@ -97,14 +100,14 @@ def _gone(shown: Sequence[Shown], decays: Sequence[float], own: Array, forced: A
     """What becomes of what each shoe adds (in rows), which decays (1/s), beside what is forced."""
     starts = -(-own.shape[1] * np.arange(WINDOWS) // WINDOWS)
     within = shown[0].limits.settled_within
-    high, low = (each.reduceat(own, starts, axis=1) for each in (np.maximum, np.minimum))
-    left = 0.5 * (high - low)
+    high, low = (extreme.reduceat(own, starts, axis=1) for extreme in (np.maximum, np.minimum))
+    swing = 0.5 * (high - low)
     end = 0.5 * (high[:, -LAST:].max(axis=1) - low[:, -LAST:].min(axis=1))  # a window may be shorter than a period
-    change, _ = trend(np.log(np.maximum(left[:, WINDOWS // 2 :], 1e-300)))
+    change, _ = trend(np.log(np.maximum(swing[:, WINDOWS // 2 :], 1e-300)))
     lost = 0.5 * np.array(decays) * shown[0].duration
     stays = (0.5 * lost > RELAXED) & (change > -_STAYS * lost)
     level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, _ABOVE * end), within * forced)
-    late = (left > level[:, None])[:, ::-1]
+    late = (swing > level[:, None])[:, ::-1]
     window = np.where(late.any(axis=1), WINDOWS - late.argmax(axis=1), 1)
     columns = {"window": window, "level": level, "end": end, "stays": stays}
     return [_Gone(**row) for row in by_rows(columns)]
@@ -114,20 +117,20 @@ def _closed(shown: Shown, theory: Linear, decay: float, forced: float, gone: _Go
     """A forced motion in closed form, but for what the shoe adds."""
     if gone.stays and gone.end >= _REST * forced:
         return None
-    found = Lasting(shown.judged, False, forced, None, forced)
+    numbers = Lasting(shown.judged, False, forced, None, forced)
     begin = gone.window * shown.samples // WINDOWS
     slow = shown.slowest(0.0)
     if gone.window <= WINDOWS - LAST and shown.duration - begin * shown.interval >= 2.0 * slow:
-        found.part = shown.part(begin)
-        found.settled = True
+        numbers.stretch = shown.stretch(begin)
+        numbers.settled = True
     else:
         late = shown.duration + _wait(decay, gone)
         needed = max(LONGER * late, ROOM * (late + 2.0 * slow))
-        found.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
+        numbers.notes["settled"] = f"what the shoe adds has not died away yet: run at least {needed:.3g} s"
     seconds = shown.duration - max(min(shown.quarter * shown.interval, shown.duration - slow), 0.0)
     if (beat := shown.beat()) > seconds and theory.opens:
-        found.notes["beat"] = f"the waves beat every {beat:.3g} s, which may open the pad again"
-    return found
+        numbers.notes["beat"] = f"the waves beat every {beat:.3g} s, which may open the pad again"
+    return numbers
 
 
 def _wait(decay: float, gone: _Gone) -> float:

@@ -15,7 +15,7 @@ from brakecli.analysis.regime.evidence import (
     LAST,
     LONGEST,
     WINDOWS,
-    Part,
+    Stretch,
     last_quarter,
     level_change,
     tenths,
@@ -27,7 +27,7 @@ from brakecli.solver.history import History, stacked
 _ALIKE = 0.4  # bounds of x over the level of vx, by how far they may leave their final values; a choice
 
 
-class Seen(NamedTuple):
+class Statistics(NamedTuple):
     """What a history shows, in SI units; nan where the samples are too few for that."""
 
     state: float  # of the contact at the end
@@ -45,30 +45,30 @@ class Seen(NamedTuple):
     settled_from: int = 0  # the sample at which the settled part begins; 0 where there is none
 
 
-def seen(histories: Sequence[History], within: float) -> list[Seen]:
+def statistics(histories: Sequence[History], within: float) -> list[Statistics]:
     """What each history shows; a settled level changes by this part of itself at most."""
 
-    def of_those(places: list[int]) -> list[Seen]:
+    def of_those(places: list[int]) -> list[Statistics]:
         columns = _columns(stacked([histories[i] for i in places]), within)
-        return [Seen(**row) for row in by_rows(columns)]
+        return [Statistics(**row) for row in by_rows(columns)]
 
-    return at_once([(each.interval, each.samples) for each in histories], of_those)
+    return at_once([(history.interval, history.samples) for history in histories], of_those)
 
 
 def _columns(history: History, within: float) -> dict[str, NDArray[Any]]:
-    """The numbers of `Seen` by their names, of each of many histories."""
+    """The numbers of `Statistics` by their names, of each of many histories."""
     samples = history.samples
     first, last = tenths(samples)
-    whole = Part(history, 0, samples)
+    whole = Stretch(history, 0, samples)
     state = history.read("state", samples - 1, samples)
-    quarter = Part(history, last_quarter(samples), samples)
+    quarter = Stretch(history, last_quarter(samples), samples)
     columns = {
         "state": state[:, 0],
         "state_from": whole.since("state", lambda values: values == state),
         "full_from": whole.since("contact_fraction", lambda values: values >= FULL),
-        "first": Part(history, 0, first).amplitude("x"),
-        "final": Part(history, last, samples).amplitude("x"),
-        "swing": Part(history, samples // 2, samples).amplitude("x"),
+        "first": Stretch(history, 0, first).amplitude("x"),
+        "final": Stretch(history, last, samples).amplitude("x"),
+        "swing": Stretch(history, samples // 2, samples).amplitude("x"),
         "amplitude": quarter.amplitude("x"),
         "level": quarter.deviation("vx"),
     }
@@ -98,15 +98,15 @@ def _windowed(history: History) -> tuple[Array, Array, Array]:
     """Standard deviation of vx (m/s), least and largest x (m) in equal windows, of each of many histories."""
     if history.samples > LONGEST:
         edges = np.linspace(0, history.samples, WINDOWS + 1).astype(int)
-        windows = [Part(history, begin, end) for begin, end in pairwise(edges)]
-        found = np.array([(each.deviation("vx"), *each.extremes("x")) for each in windows])
-        vx, least, largest = np.ascontiguousarray(found.transpose(1, 2, 0))
+        windows = [Stretch(history, begin, end) for begin, end in pairwise(edges)]
+        numbers = np.array([(window.deviation("vx"), *window.extremes("x")) for window in windows])
+        vx, least, largest = np.ascontiguousarray(numbers.transpose(1, 2, 0))
         return vx, least, largest
     x, vx = (history.read(name, 0, history.samples) for name in ("x", "vx"))
     starts, counts, firsts = _windows(history.samples)
     away = vx - vx[:, firsts]
-    mean, square = (np.add.reduceat(each, starts, axis=1) / counts for each in (away, away * away))
-    least, largest = (each.reduceat(x, starts, axis=1) for each in (np.minimum, np.maximum))
+    mean, square = (np.add.reduceat(values, starts, axis=1) / counts for values in (away, away * away))
+    least, largest = (extreme.reduceat(x, starts, axis=1) for extreme in (np.minimum, np.maximum))
     return np.sqrt(np.maximum(square - mean**2, 0.0)), least, largest
 
 

@@ -6,7 +6,7 @@ from brakecli.analysis.regime.decision import Excitation, Regime, Row, Threshold
 
 _UNSETTLED = 1.5  # times the fewest cycles, where not all of them are settled; a choice
 
-LOOKS: tuple[Row[Answers, Thresholds], ...] = (
+SHAPES: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "few cycles",
         lambda motion, limits: (
