@@ -75,16 +75,17 @@ def fate(system: System, state: Floats, within: float = math.inf, forced: Sequen
         return Fate(Kind.UNKNOWN)
     if system.smooth:
         return fate_on_smooth_pads(Shoe.of(system), state, within)
-    rest = sliding(system)
-    if rest is None or is_undamped(system.coefficients):  # no dashpot makes it settle
+    equilibrium = sliding(system)
+    if equilibrium is None or is_undamped(system.coefficients):  # no dashpot makes it settle
         return Fate(Kind.UNKNOWN)
     waves = bool(system.wheel.g.size)
-    unstable = growth(system.coefficients, rest.stiffness, system.coefficients.grip(system.belt_speed)) > 0.0
+    c = system.coefficients
+    unstable = growth(c, equilibrium.stiffness, c.grip(system.belt_speed)) > 0.0
     if not waves and unstable:
         return Fate(Kind.VIBRATION, state=state)
     calm = forced or []
     if not waves:
-        calm = [np.array([rest.x, rest.y, 0.0, 0.0])]
+        calm = [np.array([equilibrium.x, equilibrium.y, 0.0, 0.0])]
     from brakecli.analysis.rough_fate import lasts_on_rough_pads  # only these wait for its kernels
 
     lasts, last, steps = lasts_on_rough_pads(system, state, calm, within)

@@ -72,25 +72,25 @@ def over_time(history: History, system: System) -> OverTime | None:
     length = _HOPS * hop * history.interval
     peaks = [peak(frequency, row, length) if on else None for row, on in zip(density, loud, strict=True)]
     tones = np.array([math.nan if tone is None else tone for tone in peaks])
-    kept = frequency <= HIGHEST * highest
-    group = math.ceil(kept.sum() / LINES)
-    whole = kept.sum() // group * group
+    chosen = frequency <= HIGHEST * highest
+    group = math.ceil(chosen.sum() / LINES)
+    whole = chosen.sum() // group * group
     lines = frequency[:whole].reshape(-1, group).mean(axis=1)
     shown = density[:, :whole].reshape(count, -1, group).mean(axis=2)
     edges = np.array([0.0, *(middles[:-1] + 0.5 * hop * history.interval), duration])
     vibrations = []
-    for is_loud, places in groupby(range(count), lambda place: bool(loud[place])):
+    for is_loud, places in groupby(range(count), lambda k: bool(loud[k])):
         if is_loud:
-            part = [*places]
-            most = max(part, key=lambda place: float(swing[place]))
-            found = Vibration(
-                start=float(edges[part[0]]),
-                end=float(edges[part[-1] + 1]),
+            loud_windows = [*places]
+            most = max(loud_windows, key=lambda k: float(swing[k]))
+            vibration = Vibration(
+                start=float(edges[loud_windows[0]]),
+                end=float(edges[loud_windows[-1] + 1]),
                 frequency=peaks[most],
                 amplitude=float(amplitude[most]),
                 speed=float(speed[most]),
             )
-            vibrations.append(found)
+            vibrations.append(vibration)
     torque = system.radius * friction
     return OverTime(middles, speed, load, tones, amplitude, stick, torque, lines, shown, vibrations)
 
@@ -117,22 +117,22 @@ def _statistics(history: History, hop: int, count: int) -> list[Array]:
 
     These parts lie side by side; the first and the last reach to the ends of the history.
     """
-    inner = [round((place + 0.5 * (_HOPS + 1)) * hop) for place in range(count - 1)]
+    inner = [round((number + 0.5 * (_HOPS + 1)) * hop) for number in range(count - 1)]
     parts = [*pairwise([0, *inner, history.samples])]
     means = {
-        name: np.array([each.mean() for each in _read(history, name, parts)])
+        name: np.array([piece.mean() for piece in _read(history, name, parts)])
         for name in ("x", "vx", "friction_force")
     }
 
     def swing(name: str) -> Array:
         """Half of peak to peak about the trend that the means of the neighbours show."""
-        middles = np.array([0.5 * sum(part) for part in parts])
+        middles = np.array([0.5 * sum(ends) for ends in parts])
         trend = np.gradient(means[name], middles) if count > 1 else np.zeros(1)
         blocks = zip(_read(history, name, parts), trend, strict=True)
         spans = [np.ptp(block - k * np.arange(len(block))) for block, k in blocks]
         return 0.5 * np.array(spans)
 
-    stick = [np.mean(each == ContactState.STICK) for each in _read(history, "state", parts)]
+    stick = [np.mean(states == ContactState.STICK) for states in _read(history, "state", parts)]
     return [swing("x"), swing("vx"), np.array(stick), means["friction_force"]]
 
 

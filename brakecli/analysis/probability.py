@@ -20,8 +20,8 @@ class Probability(NamedTuple):
     @classmethod
     def within(cls, hits: NDArray[np.bool_], unknown: NDArray[np.bool_]) -> "Probability":
         """By samples of which some are not known: the interval reaches to where all of these are hits."""
-        found = cls.of(hits)
-        return found._replace(upper=cls.of(hits | unknown).upper) if unknown.any() else found
+        share = cls.of(hits)
+        return share._replace(upper=cls.of(hits | unknown).upper) if unknown.any() else share
 
     @classmethod
     def of(cls, hits: NDArray[np.bool_]) -> "Probability":

@@ -65,8 +65,8 @@ class _Span:
         states = [state]
         matrix = np.eye(4)
         length = self.length / self.parts
-        for part in range(self.parts):
-            run = self.flow(states[-1], part * length, length, self.steps, tangents)
+        for k in range(self.parts):
+            run = self.flow(states[-1], k * length, length, self.steps, tangents)
             if run.status is not Status.DONE or signalled():
                 return None
             states.append(run.state)
@@ -117,43 +117,43 @@ def lasts_on_rough_pads(
     is seen within some time (s).
     """
     span = _Span(system)
-    known = list[_Calm]()
-    for each in calm:
-        flown = span(np.array(each, float), True)
+    motions = list[_Calm]()
+    for begin in calm:
+        flown = span(np.array(begin, float), True)
         if flown is None:
             return None, state, span.taken
         try:
-            known.append(_Calm(span, *flown))
+            motions.append(_Calm(span, *flown))
         except np.linalg.LinAlgError:  # disturbances that are alike
             return None, state, span.taken
     last = np.array(state, float)
     far = list[float]()
     drawn = 0
     spans = [SETTLING / (slowest_of_cycles(system.coefficients) * span.length)]
-    spans += [NOTICED / -math.log(each.radius) for each in known if 0.0 < each.radius < 1.0]
-    while known and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < within:
+    spans += [NOTICED / -math.log(motion.radius) for motion in motions if 0.0 < motion.radius < 1.0]
+    while motions and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < within:
         flown = span(last, False)
         if flown is None:
             break
-        drawn = drawn + 1 if any(each.attracts(flown[0]) for each in known) else 0
+        drawn = drawn + 1 if any(motion.attracts(flown[0]) for motion in motions) else 0
         if drawn == IN_A_ROW:
             return False, flown[0][-1], span.taken
         last = flown[0][-1]
-        far.append(min(each.distance(flown[0]) for each in known))
-        quarter, rest = divmod(len(far), 4)
-        whole = rest == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
-        kept = whole and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter])
-        if kept and quarter >= max(spans) and not _falls(far[quarter:]):
+        far.append(min(motion.distance(flown[0]) for motion in motions))
+        quarter, remainder = divmod(len(far), 4)
+        whole = remainder == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
+        keeps = whole and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter])
+        if keeps and quarter >= max(spans) and not _falls(far[quarter:]):
             return True, last, span.taken
     return None, last, span.taken
 
 
 def _falls(far: list[float]) -> bool:
     """Whether distances fall from span to span, by a line through the logarithms of the means of eighths."""
-    means = [math.log(float(np.mean(part))) for part in np.array_split(far, min(len(far), 8))]
+    means = [math.log(float(np.mean(eighth))) for eighth in np.array_split(far, min(len(far), 8))]
     places = np.arange(len(means)) - 0.5 * (len(means) - 1)
     slope = float(places @ means / (places @ places))
     square = float(places @ places)
-    rest = np.array(means) - np.mean(means) - slope * places
-    error = math.sqrt(float(rest @ rest) / (len(means) - 2) / square)
+    residual = np.array(means) - np.mean(means) - slope * places
+    error = math.sqrt(float(residual @ residual) / (len(means) - 2) / square)
     return slope < -max(DRIFTS * error, STILL / len(means))

@@ -84,7 +84,7 @@ class Brake(NamedTuple):
     friction: float | None = None
 
 
-class _Known(NamedTuple):
+class _Whole(NamedTuple):
     """The same, all of it."""
 
     mass: float
@@ -107,8 +107,8 @@ class Similar(NamedTuple):
     @property
     def sentence(self) -> str:
         """What is assumed, and what follows."""
-        kept = "angles, and the ratios of all stiffnesses and dampings are those of the starter"
-        same = f"{kept}, and so is the critical friction"
+        ratios = "angles, and the ratios of all stiffnesses and dampings are those of the starter"
+        same = f"{ratios}, and so is the critical friction"
         if self.friction is None:
             same = f"friction, {same}"
         elif self.critical:
@@ -135,35 +135,35 @@ def similar(starter: str, text: str, brake: Brake) -> Similar:
             f"{starter} has speeds at given times; give a starter whose wheel turns evenly, such as case"
         )
     system = system_of(parse_case(text, starter).case)
-    before = _number(_known(system))
+    before = _number(_whole_of(system))
     if brake.friction is not None:
         text = _FRICTION.sub(partial(_with_friction, brake.friction), text)
         system = system_of(parse_case(text, starter).case)
-    given = _known(system)
-    mass = (brake.mass or given.mass) / given.mass
-    time = given.frequency / (brake.frequency or given.frequency)
-    load = (brake.load or given.load) / given.load
+    own = _whole_of(system)
+    mass = (brake.mass or own.mass) / own.mass
+    time = own.frequency / (brake.frequency or own.frequency)
+    load = (brake.load or own.load) / own.load
     length = load * time**2 / mass
-    speed = brake.speed / given.speed if brake.speed else length / time
+    speed = brake.speed / own.speed if brake.speed else length / time
     factors = Scales(mass, time, length, speed * time, 1.0 if system.smooth else speed * time)
-    wanted = _Known(given.mass * mass, given.frequency / time, given.load * load, given.speed * speed)
+    wanted = _Whole(own.mass * mass, own.frequency / time, own.load * load, own.speed * speed)
     number = _number(wanted)
-    found = Similar(_scaled(text, factors, _head(wanted, starter, brake.friction)), number, before)
+    case = Similar(_scaled(text, factors, _head(wanted, starter, brake.friction)), number, before)
     if brake.friction is None:
-        return found._replace(sticks=number < STICKS_BELOW if starter == "case" else None)
+        return case._replace(sticks=number < STICKS_BELOW if starter == "case" else None)
     critical = critical_friction(system, _stiffness(system))
-    return found._replace(friction=brake.friction, critical=critical, stable=_values(system).real.max() <= 0.0)
+    return case._replace(friction=brake.friction, critical=critical, stable=_values(system).real.max() <= 0.0)
 
 
-def _number(brake: _Known) -> float:
+def _number(brake: _Whole) -> float:
     return 2.0 * math.pi * brake.frequency * brake.speed * brake.mass / brake.load
 
 
-def _known(system: System) -> _Known:
+def _whole_of(system: System) -> _Whole:
     """What a system has; the mode that vibrates grows fastest, or decays slowest, beside steady sliding."""
     values = _values(system)
     frequency = abs(float(values[values.real.argmax()].imag)) / (2.0 * math.pi)
-    return _Known(system.coefficients.m, frequency, system.load_at_start, abs(system.belt_speed))
+    return _Whole(system.coefficients.m, frequency, system.load_at_start, abs(system.belt_speed))
 
 
 def _values(system: System) -> NDArray[np.complex128]:
@@ -174,16 +174,16 @@ def _values(system: System) -> NDArray[np.complex128]:
 
 def _stiffness(system: System) -> float:
     """Stiffness of the contact (N/m) in steady sliding, or of full contact where there is none."""
-    rest = sliding(system)
-    return rest.stiffness if rest else system.contact_stiffness
+    steady = sliding(system)
+    return steady.stiffness if steady else system.contact_stiffness
 
 
-def _with_friction(friction: float, found: re.Match[str]) -> str:
+def _with_friction(friction: float, match: re.Match[str]) -> str:
     """The line of the friction coefficient with another one; its comment stays in its column if it can."""
-    return f"{found[1]}{friction!r}".ljust(len(found[0]) - 1) + " "
+    return f"{match[1]}{friction!r}".ljust(len(match[0]) - 1) + " "
 
 
-def _head(brake: _Known, starter: str, friction: float | None) -> str:
+def _head(brake: _Whole, starter: str, friction: float | None) -> str:
     """The first lines of the case, and its title."""
     with_friction = "" if friction is None else f", with friction {friction:g}"
     of_brake = f"A brake of {brake.mass:g} kg at {brake.frequency:.4g} Hz, under {brake.load:g} N"
@@ -210,9 +210,9 @@ def _scaled(text: str, factors: Scales, title: str) -> str:
     return "\n".join([f"# {title}.", "#", units, "", *lines, ""])
 
 
-def _key(table: str, found: re.Match[str], factors: Scales) -> str:
+def _key(table: str, match: re.Match[str], factors: Scales) -> str:
     """A line with a key, whose comment stays in its column if it can."""
-    mark, name, equals, value, space, comment = found.groups("")
+    mark, name, equals, value, space, comment = match.groups("")
     powers = _POWERS.get(f"{table}.{name}", _POWERS.get(name))
     new = value if powers is None else _NUMBER.sub(partial(_times, factors, powers), value)
     before = f"{mark}{name}{equals}"

@@ -73,15 +73,15 @@ def peak(
     if density.size < FEWEST_BINS or not density[1:].max() > 0.0 or strongest < FEWEST_BINS * frequency[1]:
         return None
     i = 1 + int(np.argmax(density[1:]))
-    found = interpolated(frequency, density, i)
-    return found if i >= FEWEST_BINS and found * duration >= FEWEST_CYCLES else None
+    line = interpolated(frequency, density, i)
+    return line if i >= FEWEST_BINS and line * duration >= FEWEST_CYCLES else None
 
 
 def interpolated(frequency: Array, density: Array, i: int) -> float:
     """Frequency (Hz) of the peak at bin i, from a parabola through its logarithm."""
     if i + 1 >= density.size or density[i - 1] <= 0.0 or density[i + 1] <= 0.0:
         return float(frequency[i])
-    left, middle, right = np.log(density[i - 1 : i + 2])
-    curve = left - 2.0 * middle + right
-    shift = 0.5 * (left - right) / curve if curve < 0.0 else 0.0
+    below, top, above = np.log(density[i - 1 : i + 2])
+    curve = below - 2.0 * top + above
+    shift = 0.5 * (below - above) / curve if curve < 0.0 else 0.0
     return float(frequency[i] + np.clip(shift, -0.5, 0.5) * (frequency[1] - frequency[0]))

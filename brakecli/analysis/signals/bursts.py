@@ -74,10 +74,10 @@ def _tones(values: Array, size: int) -> list[_Tone]:
     ramp = np.linspace(0.0, 1.0, size)
     frequencies = np.fft.rfftfreq(size).astype(np.float64)
     loudest = 0.0
-    found = []
+    tones = []
     for first in range(0, len(values) - size + 1, size // 2):
-        part = values[first : first + size]
-        flat = part - part[0] - (part[-1] - part[0]) * ramp
+        frame = values[first : first + size]
+        flat = frame - frame[0] - (frame[-1] - frame[0]) * ramp
         power = np.abs(np.fft.rfft((flat - flat.mean()) * window)) ** 2
         level = power * frequencies**2  # of the derivative: drift has a slope, but no line
         power[: _CYCLES - 2] = 0.0  # drift
@@ -88,8 +88,8 @@ def _tones(values: Array, size: int) -> list[_Tone]:
         slower = np.median(level[i // 2 : i - 2])  # on the flank of a slow line, more than what is around
         clear = level[i] > _STANDS_OUT * float(max(around, slower)) / np.log(2.0)
         if clear and tone >= _SHARE * power.sum():
-            found.append((first, interpolated(frequencies, power, i), tone))
-    return [tone for tone in found if tone[2] >= _FAINT * loudest]
+            tones.append((first, interpolated(frequencies, power, i), tone))
+    return [tone for tone in tones if tone[2] >= _FAINT * loudest]
 
 
 def _lasts(values: Array, size: int, last: _Tone, tone: _Tone) -> bool:

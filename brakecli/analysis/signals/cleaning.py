@@ -80,14 +80,14 @@ class Velocity:
     @cached_property
     def quiet(self) -> int:
         """The least smoothing at which noise is a small part of the variance; otherwise the quietest."""
-        parts = [(part, m) for m, part in self.scales]
-        return next((m for part, m in parts if part <= _QUIET), min(parts, default=(1.0, 1))[1])
+        parts = [(share, m) for m, share in self.scales]
+        return next((m for share, m in parts if share <= _QUIET), min(parts, default=(1.0, 1))[1])
 
     def amplitude(self, m: int, start: int, windows: int) -> float:
         """Half of peak to peak of the displacement, smoothed over m samples: median of windows."""
         c = self._primitive
         x = c if self.measured else (c[m:] - c[:-m]) / m
-        return 0.5 * float(np.median([np.ptp(part) for part in np.array_split(x[start:], windows)]))
+        return 0.5 * float(np.median([np.ptp(window) for window in np.array_split(x[start:], windows)]))
 
     def levels(self, m: int, start: int, windows: int) -> Array:
         """Standard deviations in windows from a sample on, smoothed over m samples, without the noise."""
@@ -119,11 +119,11 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
         values = bridged(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
-    found = replace(_velocity(values, order > 0), first=first)
-    if order < 2 or not found.scales:  # the sum of noise would not look like noise
-        return found, notes
-    values = np.cumsum(found.values)
-    width = int(_DRIFT_CYCLES * _cycle(found))
+    velocity = replace(_velocity(values, order > 0), first=first)
+    if order < 2 or not velocity.scales:  # the sum of noise would not look like noise
+        return velocity, notes
+    values = np.cumsum(velocity.values)
+    width = int(_DRIFT_CYCLES * _cycle(velocity))
     slow = uniform_filter1d(values, width) if 2 * width <= len(values) else 0.0
     return replace(_velocity(values - slow, True), first=first), notes
 

@@ -70,5 +70,5 @@ def _slope(time: Array, values: Array, weights: Array) -> tuple[float, float]:
     spread = float(weights @ away**2)
     middle = float(np.average(values, weights=weights))
     slope = float(weights @ (away * (values - middle))) / spread
-    left = values - middle - slope * away
-    return slope, _IN_COMMON * math.sqrt(float(weights @ left**2) / (len(time) - 2) / spread)
+    residual = values - middle - slope * away
+    return slope, _IN_COMMON * math.sqrt(float(weights @ residual**2) / (len(time) - 2) / spread)

@@ -78,9 +78,9 @@ def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
             signal.alarm(int(_WAITING * seconds))
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
-            held = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+            in_use = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
             hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-            most = held + 2 * _MOST_MEMORY
+            most = in_use + 2 * _MOST_MEMORY
             resource.setrlimit(resource.RLIMIT_AS, (most if hard < 0 else min(most, hard), hard))
             with h5py.File(stream, "r") as file:
                 look(file)
@@ -117,10 +117,10 @@ def _member(group: h5py.Group, name: str) -> Any:
     Links to other files may lead to a pipe. HDF5 opens what a view shows as soon as its shape is asked for, and
     crashes on one that shows itself.
     """
-    for part in name.strip("/").split("/"):
-        if not isinstance(group, h5py.Group) or not isinstance(group.get(part, getlink=True), h5py.HardLink):
+    for key in name.strip("/").split("/"):
+        if not isinstance(group, h5py.Group) or not isinstance(group.get(key, getlink=True), h5py.HardLink):
             return None
-        group = group[part]
+        group = group[key]
         if isinstance(group, h5py.Dataset) and group.id.get_create_plist().get_layout() == h5d.VIRTUAL:
             return None
     return group

@@ -79,7 +79,7 @@ class SignalVerdict:
     contact_loss_fraction: None = None  # nor whether contact was lost
 
 
-_Known = tuple[Measurand, float | None, float | None, SignalThresholds]  # what is known of a signal besides it
+_Settings = tuple[Measurand, float | None, float | None, SignalThresholds]  # what is known of a signal besides it
 
 
 @dataclass(frozen=True)
@@ -106,17 +106,17 @@ def look(
     `belt_speed` in m/s, `stiffness` in N/m (of a force) where known.
     """
     step = signal.interval
-    known = (quantity, belt_speed, stiffness, thresholds)
-    found = _judge(signal, *known)
+    settings = (quantity, belt_speed, stiffness, thresholds)
+    judged = _judge(signal, *settings)
     tones = tuple(bursts(without_spikes(signal.values, quantity.order), step))
-    verdict = replace(found.verdict, bursts=tones)
+    verdict = replace(judged.verdict, bursts=tones)
     filled = sum(tone.end - tone.start for tone in tones)
     if tones and filled < _MOST_OF_IT * len(signal.values) * step and verdict.regime is not Regime.RELAXATION:
-        verdict = _of_bursts(signal, known, verdict)
-    return replace(found, verdict=verdict)
+        verdict = _of_bursts(signal, settings, verdict)
+    return replace(judged, verdict=verdict)
 
 
-def _of_bursts(signal: Signal, known: _Known, whole: SignalVerdict) -> SignalVerdict:
+def _of_bursts(signal: Signal, settings: _Settings, whole: SignalVerdict) -> SignalVerdict:
     """The verdict where tones come and go: that of the strongest burst, if those like it have most energy."""
     tones = whole.bursts
     step = signal.interval
@@ -128,8 +128,8 @@ def _of_bursts(signal: Signal, known: _Known, whole: SignalVerdict) -> SignalVer
     if sum(tone.energy for tone in like) >= _MOST_ENERGY * sum(tone.energy for tone in tones):
         begin, end = (int(time / step) for time in (burst.start, burst.end))
         margin = int(_INSIDE * (end - begin))
-        part = replace(signal, values=signal.values[begin + margin : end - margin])
-        inside = _judge(part, *known).verdict if np.isfinite(part.values).any() else whole
+        piece = replace(signal, values=signal.values[begin + margin : end - margin])
+        inside = _judge(piece, *settings).verdict if np.isfinite(piece.values).any() else whole
         sustained = inside.regime in _SUSTAINED and inside.evidence["steady_from"] == 0.0
         if sustained and abs(inside.evidence["level_change"]) < _LEVEL:
             line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
@@ -153,8 +153,8 @@ def _judge(
     step = signal.interval
     certain = thresholds.skewness_certain
     velocity, notes = cleaned(signal.values / size, order)
-    known = {Measurand.FORCE: stiffness, Measurand.TORQUE: None, Measurand.PRESSURE: None}.get(quantity, 1.0)
-    spring = math.nan if known is None else known
+    conversion = {Measurand.FORCE: stiffness, Measurand.TORQUE: None, Measurand.PRESSURE: None}.get(quantity, 1.0)
+    spring = math.nan if conversion is None else conversion
     belt = math.nan if belt_speed is None else abs(belt_speed) * spring * step ** (1 - order) / size
     raw = velocity
     slips = seek(velocity, certain)
@@ -162,18 +162,20 @@ def _judge(
     velocity = without_drift(velocity, len(velocity.smoothed(slips.scale)) / slips.count if sure else 0.0, notes)
     slips = slips if sure else seek(velocity, certain)  # drift may have hidden them
     heard = Heard(velocity, slips, belt, thresholds)
-    found = answers(heard, has_belt=quantity is not Measurand.PRESSURE)
-    decision = decide(found, thresholds)
+    record = answers(heard, has_belt=quantity is not Measurand.PRESSURE)
+    decision = decide(record, thresholds)
     per_second = None
     stick = None
     slipping = decision.row == "slips"
     if decision.regime in _SUSTAINED:
         per_second = (slips.often if slipping else heard.line) / step
-        if slipping or found.knows_belt:
-            stick = slips.stick if slipping else found.sticks if decision.regime is Regime.RELAXATION else 0.0
-    begin = found.steady_from if decision.regime in _SUSTAINED else 0.0
-    amplitude = heard.amplitude(begin) * size * step**order / spring if found.heard else math.nan
-    numbers = {name: each for name, each in asdict(found).items() if type(each) is float and math.isfinite(each)}
+        if slipping or record.knows_belt:
+            stick = slips.stick if slipping else record.sticks if decision.regime is Regime.RELAXATION else 0.0
+    begin = record.steady_from if decision.regime in _SUSTAINED else 0.0
+    amplitude = heard.amplitude(begin) * size * step**order / spring if record.heard else math.nan
+    numbers = {
+        name: value for name, value in asdict(record).items() if type(value) is float and math.isfinite(value)
+    }
     noise = size * step ** max(order - 1, 0) * velocity.noise
     verdict = SignalVerdict(
         regime=decision.regime,

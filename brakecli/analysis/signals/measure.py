@@ -68,8 +68,8 @@ class Heard:
     def line(self) -> float:
         """Cycles per sample of the strongest line, interpolated between those of the spectrum."""
         near = max(self.strongest - 1, 0)
-        place = near + int(np.argmax(self.lines[near : near + 3]))
-        return interpolated(np.arange(len(self.lines)) / len(self.clean), self.lines, place)
+        peak = near + int(np.argmax(self.lines[near : near + 3]))
+        return interpolated(np.arange(len(self.lines)) / len(self.clean), self.lines, peak)
 
     def level(self) -> dict[str, Any]:
         """Whether it lasts."""
@@ -86,8 +86,8 @@ class Heard:
             if steady(change, error, self.limits):
                 break
         was_loud = bool(levels[: windows // 2].max() >= largest)
-        found = {"died_to": died_to, "hidden": hidden, "was_loud": was_loud}
-        return {**found, "steady_from": steady_from, "level_change": change, "level_change_error": error}
+        fading = {"died_to": died_to, "hidden": hidden, "was_loud": was_loud}
+        return {**fading, "steady_from": steady_from, "level_change": change, "level_change_error": error}
 
     def harmony(self) -> dict[str, float]:
         """Parts of the energy that tell lines in step from stick."""
@@ -135,11 +135,11 @@ class Heard:
 def answers(heard: Heard, *, has_belt: bool) -> SignalAnswers:
     """The record of answers."""
     slips = heard.slips
-    found: dict[str, Any] = {"samples": float(heard.samples)}
+    facts: dict[str, Any] = {"samples": float(heard.samples)}
     if heard.heard:
-        found |= {"smoothed_over": float(heard.smoothing), "cycles": heard.cycles}
-        found |= {"samples_per_cycle": heard.samples / heard.cycles, "skewness": slips.skewness}
-        found |= {"events": float(slips.count), "slips": slips.stick_slip}
-        found |= {"slip_lasts": slips.lasts, "slip_swings": slips.swings, "knows_belt": math.isfinite(heard.belt)}
-        found |= heard.level() | heard.harmony() | heard.stay()
-    return SignalAnswers(**found, heard=heard.heard, has_belt=has_belt)
+        facts |= {"smoothed_over": float(heard.smoothing), "cycles": heard.cycles}
+        facts |= {"samples_per_cycle": heard.samples / heard.cycles, "skewness": slips.skewness}
+        facts |= {"events": float(slips.count), "slips": slips.stick_slip}
+        facts |= {"slip_lasts": slips.lasts, "slip_swings": slips.swings, "knows_belt": math.isfinite(heard.belt)}
+        facts |= heard.level() | heard.harmony() | heard.stay()
+    return SignalAnswers(**facts, heard=heard.heard, has_belt=has_belt)

@@ -72,9 +72,9 @@ def read_signal(
     path = Path(source)
     inside = None
     there = os.path.exists(path)  # noqa: PTH110 - pathlib's may raise
-    if not there and (found := re.fullmatch(r"(.+?):(/.*)", source)):
-        path = Path(found[1])
-        inside = found[2]
+    if not there and (match := re.fullmatch(r"(.+?):(/.*)", source)):
+        path = Path(match[1])
+        inside = match[2]
     try:
         if time_unit is not None and time_column is None:
             remedy = f"leave it out, or name one with {argument('time-column')}"
@@ -90,16 +90,16 @@ def read_signal(
             size = _size(None, unit, *wanted)
             relative = unit is None
         elif (sample_rate is None) == (time_column is None):
-            given = "are not given" if time_column is None else "are given twice"
+            how = "are not given" if time_column is None else "are given twice"
             remedy = f"give {argument('sample-rate')} HZ or {argument('time-column')} NAME"
-            raise UsageError(f"the times of the samples {given}; {remedy}")
+            raise UsageError(f"the times of the samples {how}; {remedy}")
         elif inside is None:
             table = TextTable(path, "a CSV file, or FILE.h5:/path of an HDF5 file")
             values, *times = table.columns_of(column, time_column)
-            place, *clock = table.places
-            size = _size(table.unit(place, *wanted), unit, *wanted)
+            index, *clock = table.places
+            size = _size(table.unit(index, *wanted), unit, *wanted)
             times = [time * _size(table.unit(clock[0], "second"), time_unit, "second") for time in times]
-            name = table.names[place] if table.names else ""
+            name = table.names[index] if table.names else ""
         elif column is not None or time_column is not None:
             remedy = f"leave out {argument('column')}, and give {argument('sample-rate')} HZ"
             raise UsageError(f"a dataset has no columns; {remedy}")
@@ -122,22 +122,21 @@ def read_signal(
         raise UnreadableResultError(f"{source}: {what}; name a readable file") from error
 
 
-def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> float:
+def _size(of_file: tuple[float, str] | None, option: str | None, *wanted: str) -> float:
     """Size of the unit that the file or an option gives; raises UsageError where they contradict each other."""
     name = f"{argument('time-unit' if 'second' in wanted else 'unit')} {printable(option or '')}"
     if option is not None:
-        given = (1.0, "") if option == "1" else si(option)
-        if given is None:
+        of_option = (1.0, "") if option == "1" else si(option)
+        if of_option is None:
             raise UsageError(f"{name}: there is no such unit; give one as in mm, um or m/s^2")
-        if given[1] not in ("", *wanted):
-            raise UsageError(
-                f"{name}: is {given[1]}, not {' or '.join(wanted)}; correct the unit, or {argument('quantity')}"
-            )
-        if found not in (None, given):
-            another = f"the file gives another unit, of {found[0]:g} {found[1]}"
+        if of_option[1] not in ("", *wanted):
+            remedy = f"correct the unit, or {argument('quantity')}"
+            raise UsageError(f"{name}: is {of_option[1]}, not {' or '.join(wanted)}; {remedy}")
+        if of_file not in (None, of_option):
+            another = f"the file gives another unit, of {of_file[0]:g} {of_file[1]}"
             raise UsageError(f"{name}: {another}; leave the option out")
-        found = given
-    size, base = found or (1.0, "")
+        of_file = of_option
+    size, base = of_file or (1.0, "")
     if base == "kilogram" and size > _GRAMS:
         what = f"acceleration is in m/s^2 or g, not in kilograms; correct the unit, or {argument('quantity')}"
         raise UsageError(what) if option else UnreadableResultError(what)
@@ -147,13 +146,14 @@ def _size(found: tuple[float, str] | None, option: str | None, *wanted: str) -> 
 def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float, str] | None:
     """The unit that a dataset says it has."""
     text = text.partition(":")[0].strip()  # what follows explains
-    found = si(text)
-    if text in ("", "-", "1") or (option is not None and found is None):
+    of_dataset = si(text)
+    if text in ("", "-", "1") or (option is not None and of_dataset is None):
         return None
-    _require(found is not None, f"there is no unit {printable(text)}; say with {argument('unit')} what it means")
-    fits = found and found[1] in _SI[quantity]
+    remedy = f"say with {argument('unit')} what it means"
+    _require(of_dataset is not None, f"there is no unit {printable(text)}; {remedy}")
+    fits = of_dataset and of_dataset[1] in _SI[quantity]
     _require(fits, f"its unit {printable(text)} is no {quantity}; correct {argument('quantity')}")
-    return found
+    return of_dataset
 
 
 class _Sound(BytesIO):
@@ -171,20 +171,20 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
     from scipy.io import wavfile
 
     sound = _Sound(data := contents(path, LARGEST))
-    if (place := data.find(b"fmt ") + 8) > 8 and len(data) >= place + 16:
+    if (start := data.find(b"fmt ") + 8) > 8 and len(data) >= start + 16:
         kind, channels, _, block, bits = struct.unpack_from(
-            f"{'>' if data[:4] == b'RIFX' else '<'}HHQHH", data, place
+            f"{'>' if data[:4] == b'RIFX' else '<'}HHQHH", data, start
         )
-        held = f"{channels} channels of {bits} bits are in blocks of {block} bytes"
+        layout = f"{channels} channels of {bits} bits are in blocks of {block} bytes"
         damaged = kind in (_INTEGERS, _FLOATS, _EXTENSIBLE) and not 0 < channels * bits <= 8 * block
-        _require(not damaged, f"its header contradicts itself, as {held}; name an intact WAV file")
+        _require(not damaged, f"its header contradicts itself, as {layout}; name an intact WAV file")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # chunks that it does not know
             rate, values = wavfile.read(sound)
     except Exception as error:
-        known = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
-        what = " ".join(str(error).split()) if known else "its header is damaged"
+        explains = isinstance(error, ValueError | OSError)  # others are of SciPy's own code
+        what = " ".join(str(error).split()) if explains else "its header is damaged"
         raise UnreadableResultError(f"cannot be read: {what}; name an intact WAV file") from error
     _require(rate > 0, "it has no sampling rate; name an intact WAV file")
     if sample_rate not in (None, rate):

@@ -66,34 +66,34 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
     if len(velocity.values) < FEWEST_SAMPLES:
         return Slips()
-    found = 0.0
+    largest = 0.0
     sign = 1.0
     scale = velocity.quiet
     for m, _ in velocity.scales:
         skewness = _skewness(velocity.thinned(m))
-        if abs(skewness) > max(found, _SURE * np.sqrt(6.0 * m / len(velocity.values))):
-            found = abs(skewness)
+        if abs(skewness) > max(largest, _SURE * np.sqrt(6.0 * m / len(velocity.values))):
+            largest = abs(skewness)
             sign = -np.sign(skewness)
             scale = m
-    scale = scale if found >= certain else velocity.quiet
+    scale = scale if largest >= certain else velocity.quiet
     chosen = replace(velocity, values=sign * velocity.values)
     values = chosen.smoothed(scale)
     values = values - values.mean()
     bulk = values[values > 0.0]
     if not len(bulk):
-        return Slips(found)
+        return Slips(largest)
     middle = float(np.median(bulk))
     noise = float(np.sqrt(velocity.noise_at(scale)))
-    spread = middle + _BULK * DEVIATION * float(np.median(np.abs(bulk - middle))) if found >= certain else 0.0
+    spread = middle + _BULK * DEVIATION * float(np.median(np.abs(bulk - middle))) if largest >= certain else 0.0
     high = max(0.5 * middle, _SURE * noise, spread)
     places = rises(-values, -_AGAIN * middle, high)
-    slips = Slips(found, scale, places, stick=float(np.mean(values > -high)))
+    slips = Slips(largest, scale, places, stick=float(np.mean(values > -high)))
     return _shaped(slips, chosen) if slips.count >= _FEWEST else slips
 
 
 def _skewness(values: Array) -> float:
     """Median of the parts of the record, which a single jump does not change."""
-    parts = [part - part.mean() for part in np.array_split(values, _PARTS)]
+    parts = [piece - piece.mean() for piece in np.array_split(values, _PARTS)]
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 
 
@@ -132,7 +132,7 @@ def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> flo
     windows = sliding_window_view(near, wide)
     places = (np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST] for i in (starts, between))
     ends = ((windows[i].min(axis=1), windows[i].max(axis=1)) for i in places)
-    (low, high), (least, most) = (map(np.median, each) for each in ends)
+    (low, high), (least, most) = (map(np.median, bounds) for bounds in ends)
     return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
 
 

@@ -117,11 +117,11 @@ def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
         c = system.coefficients
         belt = system.belt_speed
         k = system.contact_stiffness
-        if rest := sliding(system, tabulated(system)):
-            k = rest.stiffness if rest.is_pressed(system.load_at_start) else 0.0
+        if steady := sliding(system, tabulated(system)):
+            k = steady.stiffness if steady.is_pressed(system.load_at_start) else 0.0
         if belt != 0.0 and k > 0.0:
             critical = critical_friction(system, k, up_to)
-            return Answer(critical, growth(c, k, c.grip(belt)) if rest else None)
+            return Answer(critical, growth(c, k, c.grip(belt)) if steady else None)
     return None
 
 
@@ -140,13 +140,13 @@ def numbers(case: Case) -> dict[Path, Number]:
 
 def advised_keys(case: Case, patterns: Sequence[str]) -> list[Path]:
     """The single numbers whose keys fit a pattern; raises UsageError for one that fits none."""
-    known = {".".join(path): path for path, value in numbers(case).items() if isinstance(value, float)}
-    known = {key: path for key, path in known.items() if path[0] not in _IDLE}
+    paths = {".".join(path): path for path, value in numbers(case).items() if isinstance(value, float)}
+    paths = {key: path for key, path in paths.items() if path[0] not in _IDLE}
     for pattern in patterns:
-        if pattern not in KEYS and not any(fnmatchcase(key, pattern) for key in known):
+        if pattern not in KEYS and not any(fnmatchcase(key, pattern) for key in paths):
             what = "names no number that may be advised"
-            raise UsageError(f"{argument('keys')} {printable(pattern)}: {what}; these are {', '.join(known)}")
-    return [path for key, path in known.items() if any(fnmatchcase(key, pattern) for pattern in patterns)]
+            raise UsageError(f"{argument('keys')} {printable(pattern)}: {what}; these are {', '.join(paths)}")
+    return [path for key, path in paths.items() if any(fnmatchcase(key, pattern) for pattern in patterns)]
 
 
 def changed(case: Case, path: Path, value: Number) -> Case | None:
@@ -170,17 +170,17 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
     up_to = min(LARGEST_FRICTION, _FARTHER * critical) if critical else case.friction.coefficient + 0.1
 
     @cache
-    def found(x: float) -> Answer | None:
+    def answer_at(x: float) -> Answer | None:
         tell()
-        given = tuple(x * each for each in value) if isinstance(value, tuple) else x
-        there = changed(case, path, given)
+        varied = tuple(x * entry for entry in value) if isinstance(value, tuple) else x
+        there = changed(case, path, varied)
         return answer(there, up_to) if there else None
 
     noisy = _rough(case) and (path[0] == "roughness" or path[-1] == "half_length")
     step = (_ROUGH_STEP if noisy else _STEP) * (abs(at) or _scale(case, parameter))
     steps = [step, 0.5 * step] if noisy else [step]
-    slope, error = _surest(lambda x: getattr(found(x), "critical", None), at, steps)
-    rate, _ = _surest(lambda x: getattr(found(x), "growth", None), at, steps)
+    slope, error = _surest(lambda x: getattr(answer_at(x), "critical", None), at, steps)
+    rate, _ = _surest(lambda x: getattr(answer_at(x), "growth", None), at, steps)
     elasticity = slope * at / critical if slope is not None and critical and at else None
     return Sensitivity(parameter, value, elasticity, None if listed else slope, error, rate)
 
@@ -214,12 +214,12 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
             return bisect(safe, there, beyond, halvings=HALVINGS)[0]
         return bisect(lambda x: not safe(x), beyond, there, halvings=HALVINGS)[1]
 
-    inner = {each for each in (*decoupled, *_edges(case, path, value, margin)) if low < each < high}
+    inner = {edge for edge in (*decoupled, *_edges(case, path, value, margin)) if low < edge < high}
     ordered = sorted({low, high, value, *inner})
     at = ordered.index(value)
-    both = [_asked(way, decoupled, _is_angle(parameter)) for way in (ordered[at:], ordered[at::-1])]
+    both = [_ask(way, decoupled, _is_angle(parameter)) for way in (ordered[at:], ordered[at::-1])]
     places = [(way, number) for way in both for number in range(1, len(way))]
-    for way, number in sorted(places, key=lambda each: _distance(parameter, value, each[0][each[1]].edge)):
+    for way, number in sorted(places, key=lambda pair: _distance(parameter, value, pair[0][pair[1]].edge)):
         if not safe(there := way[number].value):
             continue
         before = way[number - 1].value
@@ -230,8 +230,8 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         if value == 0.0 and not decoupled:  # the least value may be as small as one likes
             to = max(to, min(there, _LEAST * high))
         if not _rough(case):
-            after = list(takewhile(lambda each: safe(each.value), way[number:]))
-            ends = [each.value for each in way[number + len(after) :]] or [high if there > value else low]
+            after = list(takewhile(lambda asked: safe(asked.value), way[number:]))
+            ends = [asked.value for asked in way[number + len(after) :]] or [high if there > value else low]
             until = ends[0] if safe(ends[0]) else last(after[-1].value, ends[0])
         reached = answer(changed(case, path, to) or case)
         critical = reached.critical if reached else None
@@ -239,29 +239,29 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
     return Change(parameter, value, None, None, None, low, high, "no help")
 
 
-class _Asked(NamedTuple):
+class _Question(NamedTuple):
     """A value that is asked, for all behind the edge next to it on the way there."""
 
     edge: float
     value: float
 
 
-def _asked(way: Sequence[float], special: Sequence[float], angle: bool) -> list[_Asked]:
+def _ask(way: Sequence[float], special: Sequence[float], angle: bool) -> list[_Question]:
     """The values to ask on a way over edges, first of all where it begins."""
-    found = [_Asked(way[0], way[0])]
+    asked = [_Question(way[0], way[0])]
     for near, far in pairwise(way):
         if near in special and near != way[0]:
-            found.append(_Asked(near, near))
+            asked.append(_Question(near, near))
         middle = 0.5 * (near + far) if angle or near * far <= 0.0 else math.copysign(math.sqrt(near * far), near)
-        found.append(_Asked(near, middle))
-    return found
+        asked.append(_Question(near, middle))
+    return asked
 
 
 def _edges(case: Case, path: Path, value: float, margin: float) -> list[float]:
     """Where the safety of a value may change; a ladder where the mean stiffness depends on it, too."""
     parameter = ".".join(path)
     if _rough(case):
-        return [each for way in _ladders(case, parameter, value) for each in way]
+        return [rung for way in _ladders(case, parameter, value) for rung in way]
     system = system_of(case)
     sign = math.copysign(1.0, system.belt_speed)
     return edges(case, parameter, value or _scale(case, parameter), system.contact_stiffness, sign, margin)
@@ -304,7 +304,7 @@ def _is_pressed(case: Case, up_to: float) -> bool:
         return True
     system = system_of(case)
     ends = [sliding(system, phi=phi) for phi in (0.0, up_to)]
-    return all(rest is not None and rest.is_pressed(system.load_at_start) for rest in ends)
+    return all(end is not None and end.is_pressed(system.load_at_start) for end in ends)
 
 
 def _rough(case: Case) -> bool:
@@ -313,8 +313,8 @@ def _rough(case: Case) -> bool:
 
 def _grows(case: Case) -> bool:
     """Whether sliding is not steady, or not stable, at the case's own friction."""
-    found = answer(case, 0.0)
-    return found is None or found.growth is None or found.critical == 0.0
+    own = answer(case, 0.0)
+    return own is None or own.growth is None or own.critical == 0.0
 
 
 def _ladders(case: Case, parameter: str, value: float) -> Iterator[list[float]]:
@@ -342,8 +342,8 @@ def _surest(
     f: Callable[[float], float | None], x: float, steps: Sequence[float]
 ) -> tuple[float | None, float | None]:
     """The derivative with the least error by one of the steps."""
-    each = (_derivative(f, x, step) for step in steps)
-    return min(each, key=lambda found: math.inf if found[1] is None else found[1])
+    derivatives = (_derivative(f, x, step) for step in steps)
+    return min(derivatives, key=lambda pair: math.inf if pair[1] is None else pair[1])
 
 
 def _derivative(f: Callable[[float], float | None], x: float, step: float) -> tuple[float | None, float | None]:

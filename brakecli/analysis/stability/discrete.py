@@ -42,7 +42,7 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
     s = system.weights if step is None else system.weights._replace(h=step)
     problem = new(PROBLEM)
     scheme.prepare(c, s, new(scheme.STATE), problem)
-    a_11, a_12, a_22, gain = (float(each) for each in (problem.a_11, problem.a_12, problem.a_22, problem.gain))
+    a_11, a_12, a_22, gain = (float(entry) for entry in (problem.a_11, problem.a_12, problem.a_22, problem.gain))
     a = a_11 * a_22 - a_12 * a_12
     steepest = contact_stiffness * float(np.abs(system.wheel.g) @ system.wheel.omega)  # bound of |∂F_y/∂x|
     # ∂e/∂F on the slip branches

@@ -35,8 +35,8 @@ def middles(case: Case, keys: Sequence[str], low: float, high: float) -> list[fl
         return []
     low, high = min(low, high), max(low, high)
     size = max(abs(low), abs(high))
-    found = edges(case, keys[0], size, system.contact_stiffness, math.copysign(1.0, system.belt_speed), 0.0)
-    ends = sorted({low, high, *(each for each in found if low < each < high)})
+    values = edges(case, keys[0], size, system.contact_stiffness, math.copysign(1.0, system.belt_speed), 0.0)
+    ends = sorted({low, high, *(value for value in values if low < value < high)})
     return [0.5 * (one + other) for one, other in pairwise(ends)]
 
 
@@ -83,14 +83,14 @@ def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: flo
     # F_y det(S) over the load, squared as the cosine of link 1 is a root of 1 + tan² there.
     pressed = (k * (c[0] * slopes["link1"][1] - c[1] * slopes["link1"][0])) ** 2
     square = square if link == "link1" else Polynomial([1.0])
-    found = set[float]()
+    roots = set[float]()
     for phi in (0.0, (1.0 + margin) * friction):
         determinant, apart = routh_hurwitz(m, b, c, k, sign * phi, damped=damped)
-        for each in (determinant, apart, pressed - (PRESSED * determinant) ** 2 * square):
-            found.update(_real_roots(each))
+        for condition in (determinant, apart, pressed - (PRESSED * determinant) ** 2 * square):
+            roots.update(_real_roots(condition))
     if what == "angle_deg":
-        return [math.degrees(math.atan(root)) for root in found]
-    return [size * root for root in found]
+        return [math.degrees(math.atan(root)) for root in roots]
+    return [size * root for root in roots]
 
 
 def _real_roots(condition: Any) -> list[float]:
@@ -101,9 +101,9 @@ def _real_roots(condition: Any) -> list[float]:
     """
     coefficients = np.atleast_1d(getattr(condition, "coef", 0.0))
     size = float(np.abs(coefficients).max())
-    found = list[float]()
+    real = list[float]()
     for least in (0.0, _LEFT * size):
         with suppress(np.linalg.LinAlgError):  # numbers beyond all bounds
             roots = polynomial.polyroots(polynomial.polytrim(coefficients, least))
-            found += [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root)]
-    return found
+            real += [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root)]
+    return real

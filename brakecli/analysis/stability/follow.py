@@ -10,14 +10,14 @@ from brakecli.analysis.stability.modes import Complex, Mode
 Pair = tuple[Mode, Mode]
 
 
-def followed(found: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
+def followed(along: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
     """The two modes at each value of a parameter, in the order of those before; None where there are none.
 
     The first ones stand by frequency. Where two modes have met, the order behind is a matter of choice: as they
     part, the one that grows comes first.
     """
     before: Pair | None = None
-    for modes in found:
+    for modes in along:
         if not modes:
             yield None
             continue
@@ -25,7 +25,7 @@ def followed(found: Iterable[tuple[Mode, ...]]) -> Iterator[Pair | None]:
         if before is None or any(mode.frequency for mode in before):
             pairs = pairs[:1]
         pairs += [(other, one) for one, other in pairs]
-        costs = [sum(map(_distance, before, each)) if before else 0.0 for each in pairs]
+        costs = [sum(map(_distance, before, pair)) if before else 0.0 for pair in pairs]
         before = pairs[np.argmin(np.round(costs, 9))]  # where modes have just met, both orders are as near
         yield before
 
@@ -42,8 +42,8 @@ def _pairs(modes: tuple[Mode, ...]) -> list[Pair]:
     if len(real) == 4 and max(real[1:], key=lambda other: _likeness(real[0], other)) is real[1]:
         choices.reverse()
     scale = max(mode.frequency for mode in modes) or 1.0  # modes that have met differ in rounding
-    for each in choices:
-        each.sort(key=lambda mode: (round(mode.frequency / scale, 9), -mode.growth))
+    for choice in choices:
+        choice.sort(key=lambda mode: (round(mode.frequency / scale, 9), -mode.growth))
     return [(one, other) for one, other in choices]
 
 

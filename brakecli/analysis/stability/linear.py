@@ -85,8 +85,8 @@ class Linear:
 
     def forced(self, time: Array) -> tuple[Array, Array]:
         """Positions and velocities (rows x, y) that the waves force."""
-        found = _sums(self, time, np.array([*self.waves.T, *(2j * math.pi * self.passing * self.waves.T)]))
-        return found[:2], found[2:]
+        sums = _sums(self, time, np.array([*self.waves.T, *(2j * math.pi * self.passing * self.waves.T)]))
+        return sums[:2], sums[2:]
 
     def stays(self, state: Array) -> bool:
         """Whether a motion on a smooth wheel that decays can neither stick nor open any more.
@@ -107,7 +107,7 @@ class Linear:
         size = abs(np.linalg.lstsq(self.vectors, away.astype(complex), rcond=None)[0][fastest])
         size *= 2.0 if self.values[fastest].imag else 1.0
         _, y, vx, _ = size * np.abs(self.vectors[:, fastest])
-        bounds = [bound / part for bound, part in ((abs(self.belt), vx), (self.depth, y)) if part > 0.0]
+        bounds = [bound / swing for bound, swing in ((abs(self.belt), vx), (self.depth, y)) if swing > 0.0]
         return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
 
 
@@ -117,8 +117,8 @@ def parts(theories: Sequence[Linear], x: Array, time: Array) -> tuple[Array, Arr
     It is that of longer motions too, as waves beat. Then, at the times given (s), the x that they force and the x
     that each shoe adds (m), in rows.
     """
-    waves = np.array([each.waves[:, 0] for each in theories])
-    rest = np.array([each.rest[:1] for each in theories])
+    waves = np.array([theory.waves[:, 0] for theory in theories])
+    equilibrium = np.array([theory.rest[:1] for theory in theories])
     lasting = _sums(theories[0], time, waves[:, None])[:, 0]
     high = lasting.max(axis=1)
     low = lasting.min(axis=1)
@@ -126,16 +126,17 @@ def parts(theories: Sequence[Linear], x: Array, time: Array) -> tuple[Array, Arr
         beyond = _extremes(theories[0], waves, _BEYOND * time[-1])
         high = np.maximum(high, beyond[0])
         low = np.minimum(low, beyond[1])
-    return 0.5 * (high - low), lasting, x - rest - lasting
+    return 0.5 * (high - low), lasting, x - equilibrium - lasting
 
 
 def force_parts(theories: Sequence[Linear], y: Array, time: Array) -> tuple[Array, Array]:
     """Half of peak to peak of the normal force (N) that the waves force; what each shoe adds to it, in rows."""
-    stiffness, rest = np.array([(each.force / each.depth, each.rest[1]) for each in theories]).T[..., None]
-    slopes, waves = np.array([(each.slopes, each.waves[:, 1]) for each in theories]).swapaxes(0, 1)
+    columns = np.array([(theory.force / theory.depth, theory.rest[1]) for theory in theories]).T
+    stiffness, equilibrium = columns[..., None]
+    slopes, waves = np.array([(theory.slopes, theory.waves[:, 1]) for theory in theories]).swapaxes(0, 1)
     pressing = slopes / theories[0].wavenumbers - stiffness * waves
     forced, lasting = _sums(theories[0], time, np.stack([pressing, waves], axis=1)).swapaxes(0, 1)
-    return 0.5 * np.ptp(forced, axis=1), stiffness * (rest + lasting - y)
+    return 0.5 * np.ptp(forced, axis=1), stiffness * (equilibrium + lasting - y)
 
 
 def _sums(theory: Linear, time: Array, waves: Complex) -> Array:
@@ -154,17 +155,17 @@ def _extremes(theory: Linear, waves: Complex, span: float) -> tuple[Array, Array
     rows = np.concatenate([begins.imag, begins.real], axis=1).swapaxes(1, 2).astype(np.float32, order="C")
     peaks = list[Any]()
     sizes = list[Any]()
-    each = np.arange(rows.shape[1])
+    block = np.arange(rows.shape[1])
     for row in rows:  # one at a time, which stays in the cache
         x = (row.reshape(-1, _FEW, row.shape[1]) @ inside).reshape(len(row), -1)
         peaks.append((x.argmax(axis=1), x.argmin(axis=1)))  # in half the time of max and min
-        sizes.append([x[each, time] for time in peaks[-1]])
+        sizes.append([x[block, time] for time in peaks[-1]])
     order = np.array(sizes).argsort(axis=2)
     highest = np.stack([order[:, 0, -_HIGHEST:], order[:, 1, :_HIGHEST]], axis=1)
     times = np.take_along_axis(np.array(peaks), highest, axis=2)
     tops = np.take_along_axis(begins[:, None], highest[:, :, None], axis=3) * np.moveaxis(turns[:, times], 0, 2)
-    found = (tops.swapaxes(2, 3) @ near).imag
-    return found[:, 0].max(axis=(1, 2)), found[:, 1].min(axis=(1, 2))
+    extremes = (tops.swapaxes(2, 3) @ near).imag
+    return extremes[:, 0].max(axis=(1, 2)), extremes[:, 1].min(axis=(1, 2))
 
 
 @lru_cache(maxsize=1)  # the points of a sweep ask for the same ones
@@ -181,7 +182,7 @@ def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Compl
     size = min(size, math.ceil(span / (apart * count)))
     begins = span * (np.arange(count) / count if filled else _SCATTERED[:count])
     times = (begins, apart * np.arange(size), _PER_PERIOD * apart * _NEAR)
-    first, turns, near = (np.exp(1j * np.outer(speeds, each)) for each in times)
+    first, turns, near = (np.exp(1j * np.outer(speeds, time)) for time in times)
     return first, turns, np.concatenate([turns.real, turns.imag], dtype=np.float32), near
 
 
@@ -204,10 +205,11 @@ def theory_of(system: System) -> Theory:
 def theories_of(systems: Sequence[System]) -> list[Theory]:
     """The theories of all systems, in a third of the time; no number of one depends on the others."""
 
-    def known(theory: Linear | None) -> Theory:
+    def constant(theory: Linear | None) -> Theory:
         return lambda: theory
 
-    return [known(each) for each in _by_waves(systems, [_last_speed(each) for each in systems])]
+    speeds = [_last_speed(system) for system in systems]
+    return [constant(theory) for theory in _by_waves(systems, speeds)]
 
 
 def linear_theory(system: System, belt: float) -> Linear | None:
@@ -260,11 +262,11 @@ class _Modes(NamedTuple):
 
 def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
     """The theories of systems with as many waves."""
-    columns = np.array([each.coefficients for each in systems]).T
+    columns = np.array([system.coefficients for system in systems]).T
     c: Any = Coefficients(**dict(zip(Coefficients._fields, columns, strict=True)))
-    stiffness, load = np.array([(each.contact_stiffness, each.load_at_start) for each in systems]).T
-    heights, forces = (np.array(each) for each in zip(*map(_pushes, systems), strict=True))
-    wheels = np.array([(each.wheel.omega, each.wheel.phase, each.wheel.turns) for each in systems])
+    stiffness, load = np.array([(system.contact_stiffness, system.load_at_start) for system in systems]).T
+    heights, forces = (np.array(column) for column in zip(*map(_pushes, systems), strict=True))
+    wheels = np.array([(system.wheel.omega, system.wheel.phase, system.wheel.turns) for system in systems])
     omega, phase, turns = wheels.swapaxes(0, 1)
     grip = np.copysign(c.phi, belt)
     offset = -stiffness * heights
@@ -272,26 +274,26 @@ def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
     push = np.stack([grip, np.ones_like(grip)], axis=-1)
     s = stiffness_matrix(c, stiffness, grip)
     pressed = load[:, None] * np.stack([c.sin_beta, c.cos_beta], axis=-1)
-    rest = _solved(s, offset[:, None] * push - pressed)
+    equilibrium = _solved(s, offset[:, None] * push - pressed)
     speed = (2.0 * math.pi * passing)[:, :, None, None]
     inertia = c.m[:, None, None, None] * speed * speed * np.eye(2)
     damping = damping_matrix(c)[:, None]
     responses = _solved(s[:, None] - inertia + 1j * speed * damping, push[:, None])
-    force = offset - stiffness * rest[:, 1]
+    force = offset - stiffness * equilibrium[:, 1]
     moves = first_order(c, s / c.m[:, None, None])
-    known = np.isfinite(rest).all(axis=1) & np.isfinite(responses).all(axis=(1, 2)) & (force > 0.0)
-    known &= np.isfinite(moves).all(axis=(1, 2))
-    phases = forces * np.exp(1j * (omega * rest[:, :1] + phase))
+    exists = np.isfinite(equilibrium).all(axis=1) & np.isfinite(responses).all(axis=(1, 2)) & (force > 0.0)
+    exists &= np.isfinite(moves).all(axis=(1, 2))
+    phases = forces * np.exp(1j * (omega * equilibrium[:, :1] + phase))
     waves = responses * phases[..., None]
     slopes = omega * phases
-    own = _modes(systems, np.where(known[:, None, None], moves, 0.0), grip)
+    own = _modes(systems, np.where(exists[:, None, None], moves, 0.0), grip)
     if turns.size:
         own = _with_slopes(own, push / c.m[:, None], passing, slopes, omega * waves[..., 0])
     return [
         Linear(
             float(belt[i]),
             (ContactState.BACKWARD_SLIP if belt[i] > 0.0 else ContactState.FORWARD_SLIP) if c.phi[i] else None,
-            rest[i],
+            equilibrium[i],
             float(force[i]),
             float(force[i] / stiffness[i]),
             replace(modes_of(own.values[i], own.vectors[i])[0], growth=float(own.growth[i])),
@@ -305,7 +307,7 @@ def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
             2.0 * float(np.abs(system.shoe.g).sum()) + float(np.abs(system.wheel.g).sum()),
             float(own.known_to[i]),
         )
-        if known[i]
+        if exists[i]
         else None
         for i, system in enumerate(systems)
     ]
@@ -313,13 +315,13 @@ def _theories(systems: Sequence[System], belt: Array) -> list[Linear | None]:
 
 def _modes(systems: Sequence[System], moves: Array, grip: Array) -> _Modes:
     """The modes of ż = A z."""
-    found, shapes = np.linalg.eig(moves)
-    values = found.astype(complex)
+    eigenvalues, shapes = np.linalg.eig(moves)
+    values = eigenvalues.astype(complex)
     vectors = shapes.astype(complex)
-    undamped = np.array([is_undamped(each.coefficients) for each in systems])
+    undamped = np.array([is_undamped(system.coefficients) for system in systems])
     for i in np.flatnonzero(undamped).tolist():  # by square roots, without spurious growth
-        each = systems[i]
-        values[i], vectors[i, :2] = eigensystem(each.coefficients, each.contact_stiffness, float(grip[i]))
+        system = systems[i]
+        values[i], vectors[i, :2] = eigensystem(system.coefficients, system.contact_stiffness, float(grip[i]))
     vectors[:, 2:] = vectors[:, :2] * values[:, None]
     growth = values.real.max(axis=1)
     known_to = np.where(undamped, 0.0, _ROUNDING * np.abs(values).max(axis=1))
@@ -346,10 +348,10 @@ def _with_slopes(own: _Modes, push: Array, passing: Array, slopes: Complex, bend
     moved = residues * (mean[:, None] + 0.25 * (answers * sizes**2).sum(axis=2))
     strong = (0.5 * np.abs(answers) * sizes).sum(axis=2).max(axis=1) + np.abs(bends).sum(axis=1)
     rates = (values + moved).real
-    known = np.isfinite(rates).all(axis=1) & (strong**2 < _WEAK)
+    holds = np.isfinite(rates).all(axis=1) & (strong**2 < _WEAK)
     off = np.abs(moved).max(axis=1) * strong**2 + _ROUNDING_WITH_SLOPES * np.abs(values).max(axis=1)
-    growth = np.where(known, rates.max(axis=1), own.growth)
-    known_to = np.where(known, off, math.inf)
+    growth = np.where(holds, rates.max(axis=1), own.growth)
+    known_to = np.where(holds, off, math.inf)
     return own._replace(growth=growth, known_to=known_to)
 
 
@@ -360,4 +362,4 @@ def _answers(vectors: Complex, push: Array) -> Complex:
     except np.linalg.LinAlgError:
         if len(vectors) == 1:
             return np.full_like(vectors[:, 0], math.nan)
-        return np.concatenate([_answers(*each) for each in zip(vectors[:, None], push[:, None], strict=True)])
+        return np.concatenate([_answers(*row) for row in zip(vectors[:, None], push[:, None], strict=True)])

@@ -46,7 +46,7 @@ class Change(NamedTuple):
 
 def grows(signs: Sequence[Rounded] | None) -> bool:
     """Whether disturbances surely grow, or there is no steady sliding."""
-    return signs is None or any(each.negative for each in signs)
+    return signs is None or any(sign.negative for sign in signs)
 
 
 def changes(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iterator[Change]:
@@ -108,10 +108,10 @@ def joined(
     `located` finds the one between two known ones, at which stability is lost, or not. Stability may be lost where
     nothing is known: a window may then begin, or end, anywhere there. Where no side is known there is no change.
     """
-    each = iter(sides)
-    low, before = next(each)
+    neighbours = iter(sides)
+    low, before = next(neighbours)
     hidden = before is None
-    for high, after in each:
+    for high, after in neighbours:
         hidden = hidden or after is None
         if after is None and high != last:
             continue
@@ -143,8 +143,8 @@ def _located(margin: Margin, low: float, high: float, lost: bool, width: float, 
         It was not surely negative at the end of the bracket: there its true value is above -2 errors, and rounding
         alone takes none nearby below -4.
         """
-        signs = [each for k, each in enumerate(margin(value) or ()) if k in passing or not passing]
-        return any(-_HIDDEN * each.error <= each.value <= each.error for each in signs)
+        signs = [sign for k, sign in enumerate(margin(value) or ()) if k in passing or not passing]
+        return any(-_HIDDEN * sign.error <= sign.value <= sign.error for sign in signs)
 
     stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
     while hidden(stable) and stable != bound:
@@ -165,10 +165,10 @@ def left_open(
     where the slope is the margin over the distance. None where one of them has no steady sliding there, and where
     steady sliding itself ends.
     """
-    signs = [each(near) for each in (margin, summed, *windows)]
-    if change.which is None or change.value == near or any(each is None for each in signs):
+    signs = [ask(near) for ask in (margin, summed, *windows)]
+    if change.which is None or change.value == near or any(sign is None for sign in signs):
         return None
-    here, exact, *others = (each[change.which].value for each in signs if each is not None)
+    here, exact, *others = (sign[change.which].value for sign in signs if sign is not None)
     off = abs(exact - here) + left_by_windows(others)
     return off * abs(change.value - near) / abs(here) if off else 0.0
 
@@ -179,7 +179,7 @@ def left_by_windows(values: Sequence[float]) -> float:
 
 
 def _negative(signs: Sequence[Rounded] | None) -> list[int]:
-    return [k for k, each in enumerate(signs or ()) if each.negative]
+    return [k for k, sign in enumerate(signs or ()) if sign.negative]
 
 
 def _narrowed(margin: Margin, low: float, high: float, lost: bool, width: float) -> tuple[float, float]:
@@ -198,17 +198,17 @@ def _narrowed(margin: Margin, low: float, high: float, lost: bool, width: float)
     root = bracketed_root(least, low, high, absolute=width)
     apart = max(width, _CLOSE * EPSILON * abs(root))
     while apart < high - low:
-        left = max(low, root - apart)
-        right = min(high, root + apart)
-        if grows(margin(left)) is not lost and grows(margin(right)) is lost:
-            return left, right
+        below = max(low, root - apart)
+        above = min(high, root + apart)
+        if grows(margin(below)) is not lost and grows(margin(above)) is lost:
+            return below, above
         apart = _WIDER * apart
     return low, high
 
 
 def _extremes(margin: Margin, values: Sequence[float]) -> list[float]:
     """Where something that keeps its sign between three values is nearest to zero, or beyond it."""
-    found = list[float]()
+    nearest = list[float]()
     for low, middle, high in zip(values, values[1:], values[2:], strict=False):
         around = [margin(value) for value in (low, middle, high)]
         if any(signs is None for signs in around):
@@ -217,34 +217,34 @@ def _extremes(margin: Margin, values: Sequence[float]) -> list[float]:
             sign = math.copysign(1.0, b.value)
             alike = sign == math.copysign(1.0, a.value) == math.copysign(1.0, c.value)
             if alike and abs(b.value) < min(abs(a.value), abs(c.value)):
-                found.append(_extreme(margin, which, sign, low, high))
-    return found
+                nearest.append(_extreme(margin, which, sign, low, high))
+    return nearest
 
 
-def _extreme(margin: Margin, which: int, sign: float, left: float, right: float) -> float:
+def _extreme(margin: Margin, which: int, sign: float, low: float, high: float) -> float:
     """The value between two at which something is nearest to zero, or beyond it; by the golden section."""
 
     def height(value: float) -> float:
         signs = margin(value)
         return sign * signs[which].value if signs is not None else math.inf
 
-    a = left + _GOLDEN * (right - left)
-    b = right - _GOLDEN * (right - left)
+    a = low + _GOLDEN * (high - low)
+    b = high - _GOLDEN * (high - low)
     at_a = height(a)
     at_b = height(b)
     for _ in range(_SEARCHES):
         if min(at_a, at_b) < 0.0:
             break
         if at_a < at_b:
-            right = b
+            high = b
             b = a
             at_b = at_a
-            a = left + _GOLDEN * (right - left)
+            a = low + _GOLDEN * (high - low)
             at_a = height(a)
         else:
-            left = a
+            low = a
             a = b
             at_a = at_b
-            b = right - _GOLDEN * (right - left)
+            b = high - _GOLDEN * (high - low)
             at_b = height(b)
     return a if at_a < at_b else b

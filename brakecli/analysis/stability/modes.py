@@ -55,9 +55,9 @@ def damping_matrix(c: Coefficients) -> NDArray[np.float64]:
 
 def _matrix(*entries: Any) -> NDArray[np.float64]:
     """A matrix of two rows of its four entries, or one for each of their values."""
-    found = np.empty((*np.shape(entries[1]), 2, 2))
-    found[..., 0, 0], found[..., 0, 1], found[..., 1, 0], found[..., 1, 1] = entries
-    return found
+    matrix = np.empty((*np.shape(entries[1]), 2, 2))
+    matrix[..., 0, 0], matrix[..., 0, 1], matrix[..., 1, 0], matrix[..., 1, 1] = entries
+    return matrix
 
 
 def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -130,8 +130,8 @@ def modes(c: Coefficients, contact_stiffness: float, grip: float) -> list[Mode]:
 
 def modes_of(values: Complex, vectors: Complex) -> list[Mode]:
     """The modes with these eigenvalues and vectors, in this order."""
-    found = [_mode(value, vector) for value, vector in zip(values, vectors.T, strict=True) if value.imag >= 0.0]
-    return sorted(found, key=lambda mode: -mode.growth)
+    unsorted = [_mode(value, vector) for value, vector in zip(values, vectors.T, strict=True) if value.imag >= 0.0]
+    return sorted(unsorted, key=lambda mode: -mode.growth)
 
 
 def _mode(value: Any, vector: Complex) -> Mode:

@@ -94,22 +94,22 @@ def stability(system: System) -> StabilityReport:
     """Linear stability of steady sliding at the speed and load of t = 0."""
     c = system.coefficients
     belt = system.belt_speed
-    rest = None
+    equilibrium = None
     reason = None
     try:
-        rest = steady_sliding(system)
+        equilibrium = steady_sliding(system)
     except CaseError as error:
         reason = error.problems[0].what
-    k = rest.stiffness if rest else system.contact_stiffness
-    if rest and not rest.is_pressed(system.load_at_start):
-        rest = None
+    k = equilibrium.stiffness if equilibrium else system.contact_stiffness
+    if equilibrium and not equilibrium.is_pressed(system.load_at_start):
+        equilibrium = None
         reason = UNPRESSED
         k = 0.0
     stiffness_at = mean_stiffness(system, k)
-    found = changes(system, stiffness_at)
-    critical = next((crossing for crossing in found if crossing.lost), None)
+    all_crossings = changes(system, stiffness_at)
+    critical = next((crossing for crossing in all_crossings if crossing.lost), None)
     means = [] if system.smooth else [tabulated(system, window) for window in range(WINDOWS)]
-    opens = means if rest and rest.contact_fraction < 1.0 else []
+    opens = means if equilibrium and equilibrium.contact_fraction < 1.0 else []
     flutter, divergence = undamped_critical(c, k, belt)
     grip = c.grip(belt)
     values, _ = eigensystem(c, k, grip)
@@ -117,19 +117,19 @@ def stability(system: System) -> StabilityReport:
     return StabilityReport(
         belt_speed=belt,
         friction=c.phi,
-        equilibrium=rest,
+        equilibrium=equilibrium,
         no_equilibrium=reason,
         contact_stiffness=k,
-        stable=not grows(conditions(links_with(c), k, grip)) if rest else None,
+        stable=not grows(conditions(links_with(c), k, grip)) if equilibrium else None,
         eigenvalues=tuple(values.tolist()),
         modes=tuple(modes(c, k, grip)),
-        crossings=tuple(found),
+        crossings=tuple(all_crossings),
         critical=critical,
         critical_error=_critical_error(system, critical, means) if critical else None,
         contact_stiffness_error=left_by_windows([at.stiffness for mean in opens if (at := sliding(system, mean))]),
         undamped_flutter=flutter,
         undamped_divergence=divergence,
-        discrete=_discrete(system, stiffness_at, critical, fastest) if rest else None,
+        discrete=_discrete(system, stiffness_at, critical, fastest) if equilibrium else None,
         stiffness_at=stiffness_at,
     )
 
@@ -151,8 +151,8 @@ def critical_friction(system: System, stiffness: float, up_to: float = LARGEST_F
     """
     c = system.coefficients
     stiffness_at = mean_stiffness(system, stiffness)
-    if found := changes(system, stiffness_at, up_to):
-        return found[0].friction if found[0].lost else 0.0
+    if all_crossings := changes(system, stiffness_at, up_to):
+        return all_crossings[0].friction if all_crossings[0].lost else 0.0
     k = stiffness_at(c.phi)
     if not k > 0.0:
         return None
@@ -182,8 +182,8 @@ def mean_stiffness(system: System, smooth: float, mean: Mean | None = None) -> S
 
     @cache
     def at(phi: float) -> float:
-        rest = sliding(system, mean, phi)
-        return rest.stiffness if rest and rest.is_pressed(system.load_at_start) else math.nan
+        steady = sliding(system, mean, phi)
+        return steady.stiffness if steady and steady.is_pressed(system.load_at_start) else math.nan
 
     return at
 
@@ -225,16 +225,16 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up
     """
     if c.c_xx == 0.0:
         return []
-    found = []
+    all_crossings = []
     frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1).tolist()
     for change in margin_changes(_along_friction(c, belt, stiffness_at), frictions):
         phi = change.value
         if change.which == FLUTTER:
             frequency = modes(c._replace(phi=phi), stiffness_at(phi), math.copysign(phi, belt))[0].frequency
-            found.append(Crossing(phi, "flutter", frequency, change.lost))
+            all_crossings.append(Crossing(phi, "flutter", frequency, change.lost))
         elif change.which is not None or change.lost:
-            found.append(Crossing(phi, "divergence", 0.0, change.lost))
-    return found
+            all_crossings.append(Crossing(phi, "divergence", 0.0, change.lost))
+    return all_crossings
 
 
 def _discrete(system: System, stiffness_at: StiffnessAt, exact: Crossing | None, rate: float) -> Discrete | None:
@@ -267,7 +267,7 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
         return 0.0
     highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
     frictions = np.linspace(0.0, highest, FRICTIONS).tolist()
-    return next((each.value for each in between(signs_at, frictions, _LOCATED) if each.lost), None)
+    return next((change.value for change in between(signs_at, frictions, _LOCATED) if change.lost), None)
 
 
 def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
