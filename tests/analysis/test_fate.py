@@ -108,7 +108,7 @@ def of_rough(friction: float, given: bool = True, seed: int = 6) -> Fate:
     tables, key, low, high, _ = rough_drawn(seed, "opening")
     line = Line(make(tables), [key.replace("__", ".")], low, high)
     p = line.place(friction)
-    point = Forced.along(line).begun(p)
+    point = Forced.along(line).begin(p)
     system = line.system(p)
     assert point is not None
     rest = steady_sliding(system)

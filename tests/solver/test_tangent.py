@@ -123,7 +123,7 @@ def test_a_forced_motion_has_the_exponent_of_its_multiplier() -> None:
     tables, key, low, high, _ = opening(6, "opening")
     line = Line(make(tables), [key.replace("__", ".")], low, high)
     p = line.place(1.0)
-    point = Forced.along(line).begun(p)
+    point = Forced.along(line).begin(p)
     period = common_period(line.system(p))
     assert point is not None
     assert period is not None

@@ -57,21 +57,21 @@ class Bound(NamedTuple):
         finer.use(one.chart)
         for apart in STRIDES:
             ends = [
-                newton.solved(
+                newton.solve(
                     point.z + way * point.tangent, point.tangent, point.tangent, point.s + way, exact=True
                 )
                 for point, way in ((one, -apart), (other, apart))
             ]
             if ends[0] is not None and ends[1] is not None and ends[0].stable is not ends[1].stable:
-                return located(newton, ends[0], ends[1])
-        first = newton.solved(self.inner.z, self.inner.tangent, self.inner.tangent, 0.0, exact=True)
+                return locate(newton, ends[0], ends[1])
+        first = newton.solve(self.inner.z, self.inner.tangent, self.inner.tangent, 0.0, exact=True)
         points = both_ways(finer, first, AROUND).points if first is not None else []
         pairs = [pair for pair in pairwise(points) if pair[0].stable is not pair[1].stable]
-        places = [located(newton, *pair) for pair in pairs if pair[0].chart is pair[1].chart]
+        places = [locate(newton, *pair) for pair in pairs if pair[0].chart is pair[1].chart]
         return min(places, key=lambda p: abs(p - self.p), default=None)
 
 
-def located(newton: Newton, one: Point, other: Point) -> float:
+def locate(newton: Newton, one: Point, other: Point) -> float:
     """The p between two motions of one chart at which the largest multiplier leaves the unit circle.
 
     By the Illinois method and by halves in turns: without damping the multiplier stays beside the circle up to

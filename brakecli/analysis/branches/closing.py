@@ -44,7 +44,7 @@ def turned_back(points: list[Point], new: Point, border: float) -> bool:
     return False
 
 
-def passed(points: list[Point]) -> list[Point]:
+def find_passed(points: list[Point]) -> list[Point]:
     """The earlier point, if any, that the last stride passes on its way along the same stretch of the branch.
 
     Newton's method may go over to another branch where two cross. Then a closed one is entered, and its first
@@ -104,7 +104,7 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
     onward = nearest.tangent
     chart = new.chart
     if foreign:
-        in_chart = newton.problem.carried(nearest, first.chart)
+        in_chart = newton.problem.carry(nearest, first.chart)
         if in_chart is None:
             return None, None
         guess = np.append(in_chart[0], nearest.p)
@@ -112,7 +112,7 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
         chart = first.chart
     newton.problem.use(chart)
     guess = guess - first.tangent * ((guess - first.z) @ first.tangent)
-    crossing = newton.solved(guess, first.tangent, onward, nearest.s, exact=True)
+    crossing = newton.solve(guess, first.tangent, onward, nearest.s, exact=True)
     if crossing is None or crossing.word != first.word:
         return None, None
     if float(np.abs(crossing.z - guess).max()) > (CARRIED if foreign else SAME_PLACE):

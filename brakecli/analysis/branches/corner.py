@@ -36,9 +36,9 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
                 for way in (onward, -onward):
                     # Newton's method begins beyond the border: from this side it would find this side again
                     guess = beside + (length - (beside - here.z) @ way) * way
-                    new = newton.solved(guess, way, way, 0.0)
+                    new = newton.solve(guess, way, way, 0.0)
                     if new is None or new.word != evaluation.word:
-                        new = newton.solved(here.z + length * way, way, way, 0.0)
+                        new = newton.solve(here.z + length * way, way, way, 0.0)
                     if new is None or new.word != evaluation.word or not newton.holds(new):
                         continue
                     chord = new.z - here.z
@@ -57,7 +57,7 @@ def led_on(newton: Newton, here: Point, new: Point, length: float) -> Point | No
     one = new.z - here.z
     for point in (new, replace(new.turned(), s=new.s)):
         guess = point.z + length * point.tangent
-        further = newton.solved(guess, point.tangent, point.tangent, 0.0)
+        further = newton.solve(guess, point.tangent, point.tangent, 0.0)
         if further is not None and further.word == new.word and newton.holds(further):
             other = further.z - here.z
             if float(other @ other) > float(one @ one):

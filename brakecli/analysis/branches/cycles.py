@@ -241,7 +241,7 @@ class Cycles(Problem):
         length = math.sqrt(speed @ speed)
         return speed / length if length > 0.0 else None
 
-    def renewed(self, point: Point) -> Guess | None:
+    def renew(self, point: Point) -> Guess | None:
         """A chart of the present size, with its anchor far from events, where either has become necessary."""
         cycle = point.facts
         chart = point.chart
@@ -284,7 +284,7 @@ class Cycles(Problem):
             state = flow.state
         return np.append((state - self.equilibrium(p)) / scales, z[4] * chart.time / time)
 
-    def carried(self, point: Point, chart: Chart) -> Guess | None:
+    def carry(self, point: Point, chart: Chart) -> Guess | None:
         """A point in another chart: the place where its cycle passes that plane nearest to the chart's anchor."""
         cycle = point.facts
         flow = self.flow(point.p)
@@ -322,7 +322,7 @@ class Cycles(Problem):
             return "grazing flight"
         return "grazing stick" if changes[0][0] or before != after else "sequence of events changes"
 
-    def doubled(self, point: Point, vector: Array) -> Guess:
+    def double(self, point: Point, vector: Array) -> Guess:
         """The motion of twice the period, displaced along the eigenvector of -1."""
         self.chart = replace(point.chart, time=2.0 * point.chart.time)
         return point.u, np.append(point.chart.basis @ vector, [0.0, 0.0])

@@ -226,7 +226,7 @@ class Explorer:
         for p in GROWN_AT:
             if self._over() or any(low <= p <= high for low, high in map(span, self.branches[1:])):
                 continue
-            first = problem.begun(p, replace(self._settings(), points=GROWING_POINTS))
+            first = problem.begin(p, replace(self._settings(), points=GROWING_POINTS))
             if first is not None:
                 self._follow(problem, first, FORCED, within=True)
         if len(self.branches) == 1 and not self.stop():
@@ -235,7 +235,7 @@ class Explorer:
     def _forced_from(self, problem: Forced, p: float, state: Any) -> None:
         """The branch of the forced motion that a run comes to; none where it is known already."""
         value = self.line.value(p)
-        motion = None if self._over() else problem.settled(p, state)
+        motion = None if self._over() else problem.settle(p, state)
         if motion is None:
             self.notes.append(f"the motion given for {value:.6g} comes to no periodic motion")
         elif self._is_followed(motion[1]):

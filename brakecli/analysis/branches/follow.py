@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from brakecli.analysis.branches.closing import LEAST_LOOP, SHARP, TURNED_BACK, closing, passed, turned_back
+from brakecli.analysis.branches.closing import LEAST_LOOP, SHARP, TURNED_BACK, closing, find_passed, turned_back
 from brakecli.analysis.branches.corner import beyond_corner, led_on
 from brakecli.analysis.branches.newton import FROM_AFAR, LEFT, OFF, Newton, Settings
 from brakecli.analysis.branches.point import Branch, End, Point, Special
@@ -69,8 +69,8 @@ def follow(
     first point. Where the first tangent is vertical, 1 means along it and -1 against it.
     """
     walk = _Walk(problem, settings or Settings(), until, stop)
-    points, end = walk.followed(first if sign is None else _directed(first, sign))
-    return _finished(walk, points, (End("start", "the branch was begun here"), end))
+    points, end = walk.follow(first if sign is None else _direct(first, sign))
+    return _finish(walk, points, (End("start", "the branch was begun here"), end))
 
 
 def both_ways(
@@ -82,21 +82,21 @@ def both_ways(
 ) -> Branch:
     """Follow a branch from a point within it both ways, as one branch with s = 0 at that point."""
     walk = _Walk(problem, settings or Settings(), until, stop)
-    points, end = walk.followed(_directed(first, 1.0))
+    points, end = walk.follow(_direct(first, 1.0))
     begin = end
     if end.kind != "closed":
-        back, begin = walk.followed(_directed(first, -1.0))
+        back, begin = walk.follow(_direct(first, -1.0))
         points = [point.turned() for point in back[:0:-1]] + points
-    return _finished(walk, points, (begin, end))
+    return _finish(walk, points, (begin, end))
 
 
-def _directed(first: Point, sign: float) -> Point:
+def _direct(first: Point, sign: float) -> Point:
     slope = first.tangent[-1]
     upward = slope > 0.0 or abs(slope) < VERTICAL
     return replace(first if upward == (sign > 0.0) else first.turned(), s=0.0)
 
 
-def _finished(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branch:
+def _finish(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branch:
     specials, unsearched = special_points(walk.newton, points, walk.over)
     for point, end in ((points[0], ended[0]), (points[-1], ended[1])):
         if end.kind != "start":
@@ -128,7 +128,7 @@ class _Walk:
             return End("seconds", f"the budget of {self.settings.seconds:g} s is spent")
         return None
 
-    def followed(self, first: Point) -> tuple[list[Point], End]:
+    def follow(self, first: Point) -> tuple[list[Point], End]:
         """The points in one direction, and why they end."""
         settings = self.settings
         points = [first]
@@ -178,7 +178,7 @@ class _Walk:
                     points[-1:] = [last] if last is not None else []
                     return points, end
                 self.problem.use(new.chart)
-                if any(closing(self.newton, earlier, here, new)[0] for earlier in passed(points)):
+                if any(closing(self.newton, earlier, here, new)[0] for earlier in find_passed(points)):
                     return points, RUNS_AGAIN
                 self.problem.use(new.chart)
             if (renewed := self._renewed(new)) is not None:
@@ -208,7 +208,7 @@ class _Walk:
         p = guess[-1]
         if not settings.low <= p <= settings.high:
             return self._end_point(here, guess)
-        new = newton.solved(guess, here.tangent, here.tangent, 0.0)
+        new = newton.solve(guess, here.tangent, here.tangent, 0.0)
         if new is None:
             return None if newton.outside is None else self._end_point(here, newton.outside)
         if not settings.low <= new.p <= settings.high:
@@ -309,12 +309,12 @@ class _Walk:
 
     def _renewed(self, point: Point) -> Point | None:
         """The point in a new chart, where the problem wants one and the motion is found in it."""
-        guess = self.problem.renewed(point)
+        guess = self.problem.renew(point)
         if guess is None:
             return None
         u, direction = guess
         onward = direction / math.sqrt(direction @ direction)
-        new = self.newton.solved(np.append(u, point.p), onward, onward, point.s, exact=True, most=FROM_AFAR)
+        new = self.newton.solve(np.append(u, point.p), onward, onward, point.s, exact=True, most=FROM_AFAR)
         if new is None or abs(new.p - point.p) > SAME_P:
             self.problem.use(point.chart)
             return None

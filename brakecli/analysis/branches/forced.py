@@ -220,7 +220,7 @@ class Forced(Doubled):
         """What one of two sequences of phases has more of. Lift-off is no border, as the force is continuous."""
         return "sequence of events changes" if before.count(STICK) == after.count(STICK) else "grazing stick"
 
-    def doubled(self, point: Point, vector: Array) -> Guess:
+    def double(self, point: Point, vector: Array) -> Guess:
         """The motion of half the periods, twice, displaced along the eigenvector of -1."""
         shifts = [vector]
         for matrix in [*point.maps, *point.maps][:-1]:
@@ -229,16 +229,16 @@ class Forced(Doubled):
 
     # --- first points ------------------------------------------------------------------------------------------
 
-    def begun(self, p: float, settings: Settings | None = None) -> Point | None:
+    def begin(self, p: float, settings: Settings | None = None) -> Point | None:
         """A motion at p: one that grows with the waves, or else one to which a run from steady sliding comes."""
-        point = self.grown(p, settings)
+        point = self.grow(p, settings)
         if point is None:
-            run = self.settled(p, self.origin(p), most=self.periods)
+            run = self.settle(p, self.origin(p), most=self.periods)
             if run is not None and run[0].periods == self.periods:
                 point = run[1]
         return point
 
-    def grown(self, p: float, settings: Settings | None = None) -> Point | None:
+    def grow(self, p: float, settings: Settings | None = None) -> Point | None:
         """The motion at p that continues steady sliding as the waves grow from nothing; None where that fails.
 
         It begins with the steady sliding of a smooth wheel.
@@ -265,7 +265,7 @@ class Forced(Doubled):
         last = branch.points[-1]
         return start(self, last.u, p) if last.p == 1.0 else None
 
-    def settled(
+    def settle(
         self, p: float, state: Array, most: int = MOST_PERIODS, waited: int = WAITED
     ) -> "tuple[Forced, Point] | None":
         """The motion that a run from a state (x, y, v_x, v_y) at t = 0 comes to, and the problem of its periods.

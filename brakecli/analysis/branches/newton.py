@@ -103,7 +103,7 @@ class Newton:
         self.why = evaluation or "the motion cannot be computed there"
         return None
 
-    def solved(
+    def solve(
         self, guess: Array, normal: Array, onward: Array, s: float, exact: bool = False, most: int | None = None
     ) -> Point | None:
         """Find the point of the branch in the hyperplane through a guess.
@@ -232,7 +232,7 @@ class Newton:
         guess[-1] = p
         normal = np.zeros(len(guess))
         normal[-1] = 1.0
-        point = self.solved(guess, normal, onward, s, exact)
+        point = self.solve(guess, normal, onward, s, exact)
         if point is not None:
             point.z[-1] = p
         return point
@@ -247,7 +247,7 @@ class Newton:
         onward = one.tangent + other.tangent if one.word == other.word else chord
         # the direction of a very short chord is mostly rounding
         normal = chord / length if length > SHORT else one.tangent
-        point = self.solved(guess, normal, onward, one.s + fraction * (other.s - one.s), exact=True)
+        point = self.solve(guess, normal, onward, one.s + fraction * (other.s - one.s), exact=True)
         if point is not None:
             off = point.z - guess
             if off @ off > (LEFT * length) ** 2 + OFF**2:
@@ -270,4 +270,4 @@ def start(
     normal[-1] = 1.0
     if onward is not None:
         normal = np.asarray(onward, float) / np.linalg.norm(onward)
-    return newton.solved(np.append(u, p), normal, normal, 0.0, exact=True, most=FROM_AFAR)
+    return newton.solve(np.append(u, p), normal, normal, 0.0, exact=True, most=FROM_AFAR)

@@ -70,11 +70,11 @@ class Problem(Protocol):
         """Return to the chart of a point."""
         self.chart = chart
 
-    def renewed(self, point: "Point") -> Guess | None:
+    def renew(self, point: "Point") -> Guess | None:
         """Change to a better chart where one is due, and say where the point lies in it. None: the chart stays."""
         return None
 
-    def carried(self, point: "Point", chart: Any) -> Guess | None:
+    def carry(self, point: "Point", chart: Any) -> Guess | None:
         """Say where the point lies in another chart. None: it cannot be said. The chart in use does not change."""
         return None
 
@@ -86,7 +86,7 @@ class Problem(Protocol):
 class Doubled(Problem, Protocol):
     """The problem of motions of twice the period."""
 
-    def doubled(self, point: "Point", vector: Array) -> Guess:
+    def double(self, point: "Point", vector: Array) -> Guess:
         """Write a motion of the single period as one of the doubled problem, and use its chart.
 
         The direction is the disturbance `vector` (d,) of the first map, which comes back with the opposite sign

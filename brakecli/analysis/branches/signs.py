@@ -155,7 +155,7 @@ def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | Non
     """A point between two of different words, on the side of one of them."""
     stride = 0.5 * (far.s - near.s) * (1.0 if base is near else -1.0)
     for _ in range(TRIES):
-        point = newton.solved(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
+        point = newton.solve(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
         if point is not None and point.word == base.word:
             return point
         stride *= SHORTER
@@ -274,15 +274,15 @@ def _changes(newton: Newton, one: Point, other: Point) -> list[Special]:
     specials = []
     turns = _differ(one, other, TURN)
     if turns:
-        specials.append(_located(newton, one, other, "fold", lambda point: point.tests[TURN]))
+        specials.append(_locate(newton, one, other, "fold", lambda point: point.tests[TURN]))
     # a change of the bordered determinant that neither p nor det(I - M) shows is none of the motion
     if one.orientation[0] * other.orientation[0] < 0.0 and (turns or _differ(one, other, FOLD)):
         top = max(one.orientation[1], other.orientation[1])
-        specials.append(_located(newton, one, other, "branch point", lambda point: _determinant(point, top)))
+        specials.append(_locate(newton, one, other, "branch point", lambda point: _determinant(point, top)))
     if _differ(one, other, FLIP):
-        specials.append(_located(newton, one, other, "flip", lambda point: point.tests[FLIP]))
+        specials.append(_locate(newton, one, other, "flip", lambda point: point.tests[FLIP]))
     if _differ(one, other, TORUS) and not (_saddle(one) and _saddle(other)):
-        torus = _located(newton, one, other, "torus", lambda point: point.tests[TORUS])
+        torus = _locate(newton, one, other, "torus", lambda point: point.tests[TORUS])
         if not _saddle(torus.point):
             specials.append(torus)
     return specials
@@ -305,7 +305,7 @@ def _saddle(point: Point) -> bool:
     return pair is None or abs(pair[0].imag) <= REAL * abs(pair[0])
 
 
-def _located(newton: Newton, one: Point, other: Point, kind: str, test: Callable[[Point], float]) -> Special:
+def _locate(newton: Newton, one: Point, other: Point, kind: str, test: Callable[[Point], float]) -> Special:
     """Locate a zero between two neighbours by the Illinois method, with Newton's method at each place."""
     low = test(one)
     high = test(other)

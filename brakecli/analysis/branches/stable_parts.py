@@ -3,7 +3,7 @@
 from itertools import groupby, pairwise
 from typing import NamedTuple
 
-from brakecli.analysis.branches.bar import Bound, located
+from brakecli.analysis.branches.bar import Bound, locate
 from brakecli.analysis.branches.newton import Newton, Settings
 from brakecli.analysis.branches.rows import Followed
 
@@ -77,7 +77,7 @@ def _bound(followed: Followed, k: int, way: int) -> Bound:
         if point.chart is beyond.chart:
             problem.use(point.chart)
             pair = (point, beyond) if way > 0 else (beyond, point)
-            p = located(Newton(problem, Settings()), *pair)
+            p = locate(Newton(problem, Settings()), *pair)
         return Bound(p, 0.0, point, beyond, problem)
     special = min(between, key=lambda special: abs(special.s - point.s))
     return Bound(special.p, special.error, point, beyond, problem)

@@ -27,12 +27,12 @@ def switch(problem: Doubled, point: Point, settings: Settings | None = None) -> 
     The plane in which it is sought lies across the doubled direction, at a distance from the flip. The motion of
     the single period crosses that plane only far away.
     """
-    u, direction = problem.doubled(point, flipped(point))
+    u, direction = problem.double(point, flipped(point))
     onward = direction / math.sqrt(direction @ direction)
     newton = Newton(problem, settings or Settings())
     flip = np.append(u, point.p)
     for distance in DISTANCES:
-        new = newton.solved(flip + distance * onward, onward, onward, 0.0, exact=True, most=FROM_AFAR)
+        new = newton.solve(flip + distance * onward, onward, onward, 0.0, exact=True, most=FROM_AFAR)
         if new is not None:
             off = new.z - flip - distance * onward
             if math.sqrt(off @ off) < LEFT * distance:

@@ -232,7 +232,7 @@ def trend(values: Array) -> tuple[Any, Any]:
     return slope, np.sqrt(np.vecdot(residual, residual) / squares / (values.shape[-1] - 2))
 
 
-def windowed(values: Array) -> Array:
+def window_means(values: Array) -> Array:
     """Means of the rows in four overlapping pieces, under a window that weighs cut cycles at the ends little."""
     size = max(2 * len(values) // 5, 1)
     window = np.hanning(size + 2)[1:-1] / np.hanning(size + 2).sum()

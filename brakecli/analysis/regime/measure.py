@@ -13,7 +13,7 @@ from brakecli.analysis.regime.answers import Answers, Continuation
 from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.cycles import Cycles, cycles_of
 from brakecli.analysis.regime.decision import Thresholds
-from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, Stretch, last_quarter, windowed
+from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, Stretch, last_quarter, window_means
 from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.regime.statistics import Statistics
 from brakecli.analysis.stability.linear import Linear
@@ -148,7 +148,7 @@ class Shown:
         What dashpots and scheme leave of both is nothing where the motion has settled.
         """
         begin = self.judged_from * self.interval
-        energies = windowed(self.track.given(begin, self.judged.mean("friction_force")))
+        energies = window_means(self.track.given(begin, self.judged.mean("friction_force")))
         powers = energies[:, :3] / energies[:, 3:]
         friction, roughness, stored = powers.mean(axis=0).tolist()
         friction_error, roughness_error, _ = (powers.std(axis=0) / 2.0).tolist()

@@ -114,9 +114,9 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     notes: list[str] = []
     first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
-        cycle = _cycle(_velocity(bridged(values), order > 0))
+        cycle = _cycle(_velocity(bridge(values), order > 0))
         values, first = _longest_piece(values, max(1.0, _SHORT_GAP * cycle), notes)
-        values = bridged(values)
+        values = bridge(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
     velocity = replace(_velocity(values, order > 0), first=first)
@@ -168,7 +168,7 @@ def _without_slow(values: Array) -> Array:
     return values - mean
 
 
-def bridged(values: Array) -> Array:
+def bridge(values: Array) -> Array:
     """Gaps filled by straight lines."""
     good = np.isfinite(values)
     places = np.arange(len(values))
@@ -177,7 +177,7 @@ def bridged(values: Array) -> Array:
 
 def without_spikes(values: Array, order: int) -> Array:
     """A signal without its gaps and spikes, as long as it was; `order` as of `cleaned`."""
-    values = bridged(values)
+    values = bridge(values)
     return _without_spikes(values, order > 0, []) if len(values) >= _SHORTEST else values
 
 
@@ -221,7 +221,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     count = int(np.sum(spikes))
     if count == 0:
         return values
-    without = bridged(np.where(spikes, np.nan, values))
+    without = bridge(np.where(spikes, np.nan, values))
     if is_velocity and count >= _FEWEST_PULSES and abs(float(np.mean(np.sign(away[spikes])))) > _ONE_WAY:
         power = np.abs(np.fft.rfft(_without_slow(without))) ** 2
         if line_share(power) < _LINES_LEFT:  # nothing is left without them

@@ -230,8 +230,8 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         if value == 0.0 and not decoupled:  # the least value may be as small as one likes
             to = max(to, min(there, _LEAST * high))
         if not _rough(case):
-            after = list(takewhile(lambda asked: safe(asked.value), way[number:]))
-            ends = [asked.value for asked in way[number + len(after) :]] or [high if there > value else low]
+            after = list(takewhile(lambda question: safe(question.value), way[number:]))
+            ends = [question.value for question in way[number + len(after) :]] or [high if there > value else low]
             until = ends[0] if safe(ends[0]) else last(after[-1].value, ends[0])
         reached = answer(changed(case, path, to) or case)
         critical = reached.critical if reached else None
@@ -248,13 +248,13 @@ class _Question(NamedTuple):
 
 def _ask(way: Sequence[float], special: Sequence[float], angle: bool) -> list[_Question]:
     """The values to ask on a way over edges, first of all where it begins."""
-    asked = [_Question(way[0], way[0])]
+    questions = [_Question(way[0], way[0])]
     for near, far in pairwise(way):
         if near in special and near != way[0]:
-            asked.append(_Question(near, near))
+            questions.append(_Question(near, near))
         middle = 0.5 * (near + far) if angle or near * far <= 0.0 else math.copysign(math.sqrt(near * far), near)
-        asked.append(_Question(near, middle))
-    return asked
+        questions.append(_Question(near, middle))
+    return questions
 
 
 def _edges(case: Case, path: Path, value: float, margin: float) -> list[float]:

@@ -22,7 +22,7 @@ FLUTTER = 1
 """Places of both conditions in a margin."""
 SURE = 3.0
 """Standard errors of the mean of windows of the waves that a bar holds; a choice."""
-_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `_located`
+_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `_locate`
 _CLOSE = 4.0  # units of rounding beside a root, where the sides of a change are asked first
 _WIDER = 8.0  # by which that becomes more
 _AT_ENDS = 1e-3  # of the distance of two values; a choice
@@ -72,10 +72,10 @@ def between(margin: Margin, values: Sequence[float], width: float = 0.0) -> Iter
     """
     sides = ((value, grows(margin(value))) for value in values)
 
-    def located(low: float, high: float, lost: bool) -> Change:
-        return _located(margin, low, high, lost, width, values[0] if lost else values[-1])
+    def locate(low: float, high: float, lost: bool) -> Change:
+        return _locate(margin, low, high, lost, width, values[0] if lost else values[-1])
 
-    return joined(sides, values[-1], located)
+    return joined(sides, values[-1], locate)
 
 
 def between_known(
@@ -87,7 +87,7 @@ def between_known(
     so many halvings are made towards both ends of what is not known.
     """
 
-    def located(low: float, high: float, lost: bool) -> Change:
+    def locate(low: float, high: float, lost: bool) -> Change:
         def as_below(value: float) -> bool | None:
             return None if (side := unstable(value)) is None else side is not lost
 
@@ -97,15 +97,15 @@ def between_known(
         _, high = bisect(lambda value: as_below(value) is not False, middle, high, width=width, halvings=halvings)
         return Change(0.5 * (low + high), 0.5 * (high - low), lost)
 
-    return joined(((value, unstable(value)) for value in values), values[-1], located)
+    return joined(((value, unstable(value)) for value in values), values[-1], locate)
 
 
 def joined(
-    sides: Iterable[tuple[float, bool | None]], last: float, located: Callable[[float, float, bool], Change]
+    sides: Iterable[tuple[float, bool | None]], last: float, locate: Callable[[float, float, bool], Change]
 ) -> Iterator[Change]:
     """The changes along rising values up to the last, each with whether it is unstable; None where nobody knows.
 
-    `located` finds the one between two known ones, at which stability is lost, or not. Stability may be lost where
+    `locate` finds the one between two known ones, at which stability is lost, or not. Stability may be lost where
     nothing is known: a window may then begin, or end, anywhere there. Where no side is known there is no change.
     """
     neighbours = iter(sides)
@@ -116,7 +116,7 @@ def joined(
         if after is None and high != last:
             continue
         if {before, after} == {False, True}:
-            yield located(low, high, after is True)
+            yield locate(low, high, after is True)
         elif hidden and {before, after} != {None}:
             if not before:
                 yield Change(low, high - low, lost=True, known=False)
@@ -127,7 +127,7 @@ def joined(
         hidden = False
 
 
-def _located(margin: Margin, low: float, high: float, lost: bool, width: float, bound: float) -> Change:
+def _locate(margin: Margin, low: float, high: float, lost: bool, width: float, bound: float) -> Change:
     """The change between two values, in a bracket at whose ends its side is sure, whatever rounding does.
 
     Where rounding hides the side of the stable end as well, the bracket reaches on, up to a bound.

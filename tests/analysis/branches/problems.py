@@ -78,7 +78,7 @@ class Orbits(Doubled):
             maps.append(by_place)
         return Evaluation(gap, by_u, by_p if with_parameter else None, np.array(maps), self.k, places.copy())
 
-    def doubled(self, point: Point, vector: Array) -> Guess:
+    def double(self, point: Point, vector: Array) -> Guess:
         places = point.u.reshape(self.k // 2, -1)
         out = [vector]
         for place in places:
@@ -158,14 +158,14 @@ class Scaled(Problem):
             x**2 + q**2 - 0.04, by_u, by_p, np.array([np.eye(1) + by_u]), "", self.origin() + 0.1 * u[0]
         )
 
-    def renewed(self, point: Point) -> Guess | None:
+    def renew(self, point: Point) -> Guess | None:
         if abs(point.u[0]) < 1.0:
             return None
         self.chart = (self.origin() + 0.1 * point.u[0],)
         self.charts.append(self.chart)
         return np.zeros(1), point.tangent
 
-    def carried(self, point: Point, chart: object) -> Guess | None:
+    def carry(self, point: Point, chart: object) -> Guess | None:
         assert isinstance(chart, tuple)
         assert isinstance(point.chart, tuple)
         return (point.u + 10.0 * (point.chart[0] - chart[0]), point.tangent) if self.carries else None

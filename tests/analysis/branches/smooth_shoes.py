@@ -75,7 +75,7 @@ class Followed:
         """The same point, corrected until nothing changes."""
         self.cycles.use(point.chart)
         newton = Newton(self.cycles, Settings(exact=1e-12, iterations=12))
-        return newton.solved(point.z, point.tangent, point.tangent, point.s, exact=True)
+        return newton.solve(point.z, point.tangent, point.tangent, point.s, exact=True)
 
     @property
     def inner(self) -> list[Point]:

@@ -320,7 +320,7 @@ def beside_fold(found: Followed, fold: Point) -> tuple[tuple[Point, Point], tupl
     pairs = []
     for length in (5e-3, 1e-2):
         points = [
-            newton.solved(fold.z + way * length * fold.tangent, fold.tangent, fold.tangent, 0.0, exact=True)
+            newton.solve(fold.z + way * length * fold.tangent, fold.tangent, fold.tangent, 0.0, exact=True)
             for way in (1.0, -1.0)
         ]
         if points[0] is None or points[1] is None or {points[0].word, points[1].word} != {fold.word}:

@@ -200,7 +200,7 @@ def test_the_derivative_by_the_parameter_is_that_of_the_new_word() -> None:
         assert point.tangent[0] == pytest.approx(slope * point.tangent[1], rel=1e-9)
     # from a guess below the border to the point above it at u = 0.05
     across = np.array([1.0, 0.0])
-    found = Newton(problem, Settings()).solved(np.array([0.05, 0.49]), across, across, 0.0)
+    found = Newton(problem, Settings()).solve(np.array([0.05, 0.49]), across, across, 0.0)
     assert found is not None
     assert found.p == pytest.approx(0.5 + 0.05 / 3.0, abs=1e-12)
 

@@ -64,7 +64,7 @@ def some(branch: Branch, count: int) -> Iterator[Point]:
 
 def begun(problem: Forced) -> Point:
     """A motion that has grown with the waves, at the first place where one does."""
-    point = next((found for p in (0.0, 1.0, 0.5) if (found := problem.grown(p)) is not None), None)
+    point = next((found for p in (0.0, 1.0, 0.5) if (found := problem.grow(p)) is not None), None)
     assert point is not None
     return point
 
@@ -126,7 +126,7 @@ def test_a_low_wave_forces_the_linear_response_and_its_multipliers_are_those_of_
     tables, shoe = linear(phi)
     line = Line(Case.model_validate(tables), [FRICTION], 0.0, 2.0 * phi)
     problem = Forced.along(line, per_period=60.0)
-    point = problem.grown(0.5)
+    point = problem.grow(0.5)
     assert point is not None
     period = 0.017 / shoe.belt
     expected = np.exp(shoe.modes * period)
@@ -180,7 +180,7 @@ def test_the_motion_of_twice_the_period_is_that_of_a_run() -> None:
     assert gap(system, point.facts.state, point.facts.period) < 1e-4 * stretch(point)
     assert gap(system, point.facts.state, 0.5 * point.facts.period) > 1e-3
     assert point.stable
-    run = problem.settled(point.p, np.array(point.facts.state) + 1e-4 * scales(system), waited=400)
+    run = problem.settle(point.p, np.array(point.facts.state) + 1e-4 * scales(system), waited=400)
     assert run is not None
     assert run[0].periods == 2
     same, later = (np.abs(run[1].u - each).max() for each in (point.u, np.roll(point.u, 4)))
@@ -190,10 +190,10 @@ def test_the_motion_of_twice_the_period_is_that_of_a_run() -> None:
 def test_a_run_settles_on_the_motion_that_has_grown() -> None:
     _, line = line_of(DOUBLES)
     problem = Forced.along(line)
-    grown = problem.grown(0.1)
+    grown = problem.grow(0.1)
     assert grown is not None
     assert grown.stable
-    run = problem.settled(0.1, np.array(grown.facts.state) + 0.1 * scales(line.system(0.1)), waited=600)
+    run = problem.settle(0.1, np.array(grown.facts.state) + 0.1 * scales(line.system(0.1)), waited=600)
     assert run is not None
     assert run[0].periods == 1
     np.testing.assert_allclose(run[1].u, grown.u, atol=1e-6)
@@ -206,8 +206,8 @@ def test_more_segments_change_nothing() -> None:
     frame = whole.frame
     parts = Forced(line.system, replace(frame, segments=4, steps=frame.steps // 4))
     whole = Forced(line.system, replace(frame, steps=frame.steps // 4 * 4))
-    one = whole.grown(0.4)
-    other = parts.grown(0.4)
+    one = whole.grow(0.4)
+    other = parts.grow(0.4)
     assert one is not None
     assert other is not None
     np.testing.assert_allclose(other.u[:4], one.u, atol=1e-8)
@@ -229,7 +229,7 @@ def test_a_branch_passes_borders_of_stick() -> None:
     tables["roughness"] = {"wheel": {"amplitudes": [1e-4], "wavelengths": [0.0012]}}
     line = Line(Case.model_validate(tables), ["wheel.angular_speed"], 0.35, 0.45)
     problem = Forced.along(line)
-    point = problem.grown(0.0)
+    point = problem.grow(0.0)
     assert point is not None
     branch = follow(problem, point, 1.0)
     assert branch.ended[1].kind == "range"
@@ -257,8 +257,8 @@ def test_a_branch_ends_where_cases_are_no_longer_valid() -> None:
     tables, _ = line_of(9000)
     line = Line(Case.model_validate(tables), [FRICTION], -0.2, 0.6)
     problem = Forced.along(line)
-    assert problem.grown(0.0) is None
-    point = problem.grown(1.0)
+    assert problem.grow(0.0) is None
+    point = problem.grow(1.0)
     assert point is not None
     branch = follow(problem, point, -1.0)
     assert branch.ended[1].kind == "lost"
@@ -291,7 +291,7 @@ def test_random_open_pads_end_for_a_reason() -> None:
             problem = Forced.along(line)
         except CaseError:
             continue
-        point = problem.grown(0.0, Settings(low=1e-3, first=0.05, longest=1.0, change=math.inf, seconds=math.inf))
+        point = problem.grow(0.0, Settings(low=1e-3, first=0.05, longest=1.0, change=math.inf, seconds=math.inf))
         if point is None:
             continue
         branch = follow(problem, point, 1.0, Settings(seconds=math.inf))
@@ -367,7 +367,7 @@ def test_the_amplitude_of_a_small_forced_motion_is_that_of_the_linear_one() -> N
     """Of one wave in full contact: |x| of (S + iωB - ω²m) z = f, by another program's formula."""
     line = Line(make(SMALL), [FRICTION], 0.05 * 0.3678, 0.7 * 0.3678)
     problem = Forced.along(line)
-    first = problem.begun(0.0)
+    first = problem.begin(0.0)
     assert first is not None
     branch = follow(problem, first, 1.0)
     assert len(branch.points) > 5

@@ -149,7 +149,7 @@ def test_folds_and_flips_of_the_piecewise_linear_oscillator_are_where_its_exact_
     """
     along = line()
     problem = Forced.along(along, per_period=240.0)
-    first = problem.begun(0.0)
+    first = problem.begin(0.0)
     assert first is not None
     branch = both_ways(problem, first, Settings(longest=0.25))
     assert [end.kind for end in branch.ended] == ["range", "range"]

@@ -272,7 +272,7 @@ def event_driven_growth(friction: float) -> float:
 
     Newton's method on the map over the period finds the forced motion; its derivative has the multipliers.
     """
-    point = Forced.along(Line(make(OPENS), ["friction.coefficient"], 0.0, 3.0)).begun(friction / 3.0)
+    point = Forced.along(Line(make(OPENS), ["friction.coefficient"], 0.0, 3.0)).begin(friction / 3.0)
     assert point is not None
     solver = {"scheme": "event-driven", "tolerance": 1e-11, "duration": 1.0}
     system = system_of(
