@@ -99,7 +99,7 @@ def test_a_shoe_that_never_moves_along_a_standing_wheel_has_a_verdict_while_the_
     load = {"load__times": (0.0, 0.5), "load__forces": (100.0, 5000.0)}
     verdict = verdict_of(make(SQUEAL, **changes, **load, solver__duration=0.5))
     assert verdict.regime is Regime.DAMPED
-    assert verdict.left == 0.0
+    assert verdict.remaining == 0.0
 
 
 def test_a_shoe_that_is_carried_along_is_not_called_damped() -> None:

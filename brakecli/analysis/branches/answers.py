@@ -239,7 +239,7 @@ class Answers:
         search = self.explored.search
         if not search.pushes:
             return ""
-        lowest = [min(piece.low.p for piece in stable_parts(followed)) for followed in search.found]
+        lowest = [min(piece.low.p for piece in stable_parts(followed)) for followed in search.islands]
         values = " and ".join(f"{self.line.value(p):.4g}" for p in sorted(lowest))
         how = f"found in {search.pushes} pushes"
         if len(lowest) == 0:

@@ -297,7 +297,7 @@ class Explorer:
             self._follow(problem, first, note=f"from a push at {value:.6g}", within=True)
             *others, followed = self.branches
             if not any(meets(followed, other) for other in others):
-                self.search.found.append(followed)
+                self.search.islands.append(followed)
 
     def _problem(self) -> Cycles:
         return Cycles(self.line) if self.line.smooth else RoughCycles(self.line)

@@ -39,7 +39,7 @@ class Search:
 
     pushes: int = 0
     undecided: int = 0  # of which it was not known in time what they come to
-    found: list[Followed] = field(default_factory=list)
+    islands: list[Followed] = field(default_factory=list)
     seconds: float = 0.0  # of the whole search
 
 

@@ -65,7 +65,7 @@ def _verdict(shown: Shown, record: Answers, decision: Decision, what: Lasting, *
         amplitude_forced=what.forced,
         amplitude_own=what.own,
         forced_frequency=what.forced_frequency,
-        left=look.final_level / look.largest_level if moves else 0.0,
+        remaining=look.final_level / look.largest_level if moves else 0.0,
         growth_rate=record.own if theory and math.isfinite(record.own) else None,
         ringing_frequency=theory.mode.frequency if theory else None,
         frequency_resolution=1.0 / (segment(stretch.stop - stretch.start) * shown.interval),

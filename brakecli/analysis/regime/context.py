@@ -33,7 +33,7 @@ class Context(NamedTuple):
     quiet: float = 0.0  # m/s, size of vx that may come from rounding
     frictionless: bool = False
     undamped: bool = False
-    held: bool = True  # whether a link holds the shoe along the wheel
+    held_by_link: bool = True  # whether a link holds the shoe along the wheel
     locks: float | None = None  # friction coefficient from which the shoe locks itself, where its own is larger
     touches: Callable[[], bool] = lambda: True  # whether the shoe touches the wheel where it slides steadily
     settles: float = math.inf  # 1/s: the slowest disturbance of a limit cycle without stick decays no faster
@@ -88,7 +88,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
         quiet=_ROUNDING * fastest,
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
-        held=c.c_xx > 0.0,
+        held_by_link=c.c_xx > 0.0,
         locks=limit if c.phi > (limit := locks_from(c, system.contact_stiffness, belt)) else None,
         touches=lambda: stiffness() > 0.0,
         settles=slowest_of_cycles(c),

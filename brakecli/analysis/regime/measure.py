@@ -189,7 +189,7 @@ def answers(shown: Shown) -> Answers:
         "frictionless": context.frictionless,
         "undamped": context.undamped,
         "locking_friction": math.nan if context.locks is None else context.locks,
-        "held_by_link": context.held,
+        "held_by_link": context.held_by_link,
         "never_touched": shown.stays(ContactState.SEPARATED, 0),
         "contact_lost": shown.stays(ContactState.SEPARATED, shown.half),
         "contact_left": shown.stays(ContactState.SEPARATED, shown.quarter),

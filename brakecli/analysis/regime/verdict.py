@@ -30,7 +30,7 @@ class Verdict:
     amplitude_own: float | None = None  # m, on a rough wheel: what the shoe adds
     forced_frequency: float | None = None  # Hz, of the wave that moves x most
     longer: bool = False  # whether a longer run may say more of the numbers of what lasts
-    left: float = 0.0  # of the level of vx at its highest, in the last quarter
+    remaining: float = 0.0  # of the level of vx at its highest, in the last quarter
     growth_rate: float | None = None  # 1/s, of the slowest mode where the motion is linear
     ringing_frequency: float | None = None  # Hz, of that mode
     frequency_resolution: float | None = None  # Hz, to which a line of the spectrum is known
@@ -61,7 +61,7 @@ class Verdict:
         if self.regime is Regime.UNDECIDED:
             return self.decision.longer
         if self.excitation is Excitation.NONE:
-            return not self.settled and self.left > FADED
+            return not self.settled and self.remaining > FADED
         return self.longer
 
     @property

@@ -136,7 +136,7 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
         "settled_from": start,
         "settled": False,
         "evidence": evidence,
-        "left": math.exp(theory.mode.growth * (end - reached)),
+        "remaining": math.exp(theory.mode.growth * (end - reached)),
     }
     if decision.regime is not Regime.DAMPED:
         return Verdict(decision, amplitude(start, end), **numbers), last.tolist()

@@ -59,13 +59,13 @@ def test_a_vibration_that_no_branch_from_flutter_reaches_is_found_from_its_fold_
     begin = f"{found.coexists_from:.4g}"
     assert f"a vibration can exist from {begin} on" in found.beside
     assert found.beside.endswith(f"; another vibration, found in 640 pushes, exists from {begin} on")
-    assert (found.search.pushes, len(found.search.found)) == (640, 1)
+    assert (found.search.pushes, len(found.search.islands)) == (640, 1)
 
 
 @pytest.mark.parametrize("name", ISLANDS)
 def test_just_above_that_fold_another_scheme_returns_to_the_same_state(name: str) -> None:
     explorer = explored(ISLANDS[name], FEW)
-    (island,) = explorer.search.found
+    (island,) = explorer.search.islands
     assert island.branch is not None
     stable = [point for point in island.branch.points if point.stable]
     lowest = min(stable, key=lambda point: point.p)
@@ -89,7 +89,7 @@ def test_without_pushes_nothing_is_said_of_them(name: str) -> None:
 
 def test_a_vibration_of_a_known_branch_is_no_other_one() -> None:
     found = found_of(SUBCRITICAL, FEW)
-    assert found.search.found == []
+    assert found.search.islands == []
     assert found.coexists_from == found_of(SUBCRITICAL, 0).coexists_from
     assert found.beside.endswith(f"; no other vibration found in {PARTS * FEW} pushes")
 
@@ -114,7 +114,7 @@ def test_pushes_without_an_end_are_counted(monkeypatch: pytest.MonkeyPatch) -> N
 def test_what_is_found_and_not_followed_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(explore, "MOST_PUSHED", 0)
     explorer = explored(ISLANDS["large"], FEW)
-    assert explorer.search.found == []
+    assert explorer.search.islands == []
     assert all("comes to was not followed" in note for note in explorer.notes)
     assert explorer.notes
 

@@ -64,7 +64,7 @@ def made_up(*durations: float, failure: Failure = Failure.NONE) -> list[float]:
         done = Decision("", Regime.DAMPED)
         verdict = replace(judged.verdict, decision=done if part.duration in durations else open_)
         motion = replace(judged.motion, work=replace(judged.motion.work, failure=failure))
-        return judged._replace(verdict=replace(verdict, left=0.0), motion=motion)
+        return judged._replace(verdict=replace(verdict, remaining=0.0), motion=motion)
 
     settle(system, run)
     return tried
@@ -210,9 +210,9 @@ LASTS = Decision("lasts", Regime.RELAXATION, Excitation.SELF_EXCITED)
     [
         (UNDECIDED, {}, True),
         (Decision("neutral"), {}, False),
-        (DAMPED, {"left": 0.5}, True),
-        (DAMPED, {"left": 1e-3}, False),
-        (DAMPED, {"left": 0.5, "settled": True}, False),
+        (DAMPED, {"remaining": 0.5}, True),
+        (DAMPED, {"remaining": 1e-3}, False),
+        (DAMPED, {"remaining": 0.5, "settled": True}, False),
         (LASTS, {"settled": True}, False),
         (LASTS, {}, False),
         (LASTS, {"longer": True}, True),
