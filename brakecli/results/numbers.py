@@ -63,7 +63,8 @@ def _known(value: Any) -> Any:
 def _branch(result: StoredResult, group: str) -> dict[str, Any]:
     """A branch: its motions, and its special points."""
     points = [each for each in stability_fields.BRANCH_POINT if each.name != "multipliers"]
-    found = {"note": "", **result.group_attributes(group)}
+    found: dict[str, Any] = {"note": ""}
+    found |= {name: plain(value) for name, value in result.group_attributes(group).items()}
     found["points"] = rows(result, group, points)
     found["special"] = rows(result, f"{group}/special", stability_fields.SPECIAL)
     return found

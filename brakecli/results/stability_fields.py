@@ -92,11 +92,13 @@ SPECIAL = (
     Field("kind", "", "what changes there", "S16"),
     *within("motion.", *MOTION),
     Field("error", "of the key", "error of the value"),
-    Field("reason", "", "of an end: why the branch ends there", TEXT),
+    Field("reason", "", "of an end: why it ends; of grazing: what begins or ends, along the branch", TEXT),
 )
 ONE_BRANCH = (
     Field("kind", "", "steady sliding, limit cycle or forced motion", TEXT),
     Field("note", "", "where it was begun, if not where steady sliding flutters", TEXT),
+    Field("unstable_lower", "of the key", "lower ends of the intervals along it in which it is unstable", OBJECT),
+    Field("unstable_upper", "of the key", "their upper ends", OBJECT),
     Field("special", "", "special points along it", OBJECT, in_file=False, rows=SPECIAL),
     Field("points", "", "its motions in order", OBJECT, in_file=False, rows=BRANCH_POINT),
 )

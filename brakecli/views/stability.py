@@ -245,6 +245,9 @@ def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer
         stable = sum(bool(point["stable"]) for point in points)
         there = " beside the one at flutter" * (len(points) < len(each["points"]))
         head = f"branch {number}: {each['kind']}, {len(points)} motions{there}, {stable} of them stable"
+        spans = zip(each.get("unstable_lower") or (), each.get("unstable_upper") or (), strict=True)
+        parts = ", ".join(f"from {low:.4g} to {high:.4g}" for low, high in spans)
+        head += f"; unstable {parts}" if parts else ""
         note = f" ({each['note']})" if each["note"] else ""
         tables.append(Table(_special_points(each["special"]), head + note))
     return View(title, sentences([str(numbers["sentence"] or "")]), [*rows, *tables])

@@ -216,11 +216,11 @@ class Answers:
         return min(amplitudes, default=None)
 
     @property
-    def cut(self) -> list[Mark]:
-        """The ends of branches that do not reach an end of the range, or steady sliding, or themselves."""
+    def cut(self) -> list[tuple[int, Mark]]:
+        """The ends of branches, and their numbers, that reach neither an end of the range nor a known motion."""
         complete = ("it reaches", "it is closed")
-        marks = [mark for followed in self.branches[1:] for mark in followed.ended]
-        return [mark for mark in marks if not mark.reason.startswith(complete)]
+        marks = [(number, mark) for number, followed in enumerate(self.branches) for mark in followed.ended]
+        return [(number, mark) for number, mark in marks if number and not mark.reason.startswith(complete)]
 
     @cached_property
     def sentence(self) -> str:
@@ -230,18 +230,35 @@ class Answers:
             parts.append(
                 f"at the case's {self.own:.4g} an unstable cycle of {metres(self.barrier)} lies between the two"
             )
-        parts += [f"the branch is cut at {mark.motion.value:.6g}: {mark.reason}" for mark in self.cut[:2]]
+        parts += [
+            f"branch {number} is cut at {mark.motion.value:.6g}: {mark.reason}" for number, mark in self.cut[:2]
+        ]
         return "; ".join(filter(None, [*parts, *self.explored.notes, self.sought]))
 
     @cached_property
+    def _lowest_found(self) -> list[float]:
+        """The places from which vibrations exist that pushes have found, in order."""
+        found = self.explored.search.islands
+        return sorted(min(part.low.p for part in stable_parts(followed)) for followed in found)
+
+    @cached_property
+    def pushed(self) -> str:
+        """How the vibration was found that exists from `coexists_from` on, if by pushes, in words."""
+        begins = {max(p, begin) for p in self._lowest_found[:1] for begin, _ in self.stable_spans}
+        by_pushes = bool(self.coexisting) and self.coexisting[0][0] in begins
+        return f", found in {self.explored.search.pushes} pushes," if by_pushes else ""
+
+    @cached_property
     def sought(self) -> str:
-        """What pushes have come to, in words; empty where there were none."""
+        """What pushes have come to, but for what `pushed` says, in words; empty where there were none."""
         search = self.explored.search
         if not search.pushes:
             return ""
-        lowest = [min(piece.low.p for piece in stable_parts(followed)) for followed in search.islands]
-        values = " and ".join(f"{self.line.value(p):.4g}" for p in sorted(lowest))
+        lowest = self._lowest_found[1:] if self.pushed else self._lowest_found
+        values = " and ".join(f"{self.line.value(p):.4g}" for p in lowest)
         how = f"found in {search.pushes} pushes"
+        if len(lowest) == 0 and self.pushed:
+            return f"what {search.undecided} of the pushes come to is not known" if search.undecided else ""
         if len(lowest) == 0:
             words = f"no other vibration {how}"
         elif len(lowest) == 1:
@@ -284,7 +301,7 @@ class Answers:
         reaches = any(abs(until - edge) < SAME for edge in (1.0, *(low.p for low, _ in self.windows)))
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
         what = "the motion that the waves force" if self.bases else "stable sliding"
-        return [f"{where} a vibration at {frequency:.4g} Hz can exist beside {what}"]
+        return [f"{where} a vibration at {frequency:.4g} Hz{self.pushed} can exist beside {what}"]
 
 
 def metres(length: float) -> str:

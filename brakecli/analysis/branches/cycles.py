@@ -94,6 +94,23 @@ def cyclic(word: tuple[int, ...]) -> tuple[int, ...]:
     return min(word[k:] + word[:k] for k in range(len(word)))
 
 
+NAMES = {STICK: "stick", OPEN: "flight", FORWARD: "slip forwards", BACKWARD: "slip backwards"}
+"""Of phases; what stands first is what a change of their sequence is told by."""
+
+
+def changed_phases(before: tuple[int, ...], after: tuple[int, ...]) -> str:
+    """What begins or ends from one sequence of phases to another; empty where only their order changes."""
+    for phase, name in NAMES.items():
+        there = before.count(phase)
+        more = after.count(phase) - there
+        if more and not there:
+            return f"{name} begins"
+        if more:
+            often = "once" if abs(more) == 1 else f"{abs(more)} times"
+            return f"{name} {often} {'more' if more > 0 else 'less'}" if there + more else f"{name} ends"
+    return ""
+
+
 class Cycles(Problem):
     """Limit cycles along a line of cases on smooth pads."""
 
@@ -315,12 +332,26 @@ class Cycles(Problem):
         direction[:4] -= speed * (chart.normal @ direction[:4]) / (chart.normal @ speed)
         return u, direction
 
+    def halved(self, point: Point) -> Array | None:
+        """By what half of its period moves a motion that has been doubled, in the scales of its chart."""
+        if self.periods % 2:
+            return None
+        state = np.array(point.facts.state)
+        flow = self.flow(point.p)
+        if self._over_period(flow, state, 0.5 * float(point.u[4]), point.chart, derivative=False) != DONE:
+            return None
+        return np.asarray((flow.state - state) / point.chart.scales)
+
     def border(self, before: Any, after: Any) -> str:
         """What one of two sequences of phases has more of: stick, or flight."""
         changes = [(after.count(phase) - before.count(phase), phase) for phase in (STICK, OPEN)]
         if changes[1][0]:
             return "grazing flight"
         return "grazing stick" if changes[0][0] or before != after else "sequence of events changes"
+
+    def change(self, before: Any, after: Any) -> str:
+        """What begins or ends from one sequence of phases to another."""
+        return changed_phases(before, after)
 
     def double(self, point: Point, vector: Array) -> Guess:
         """The motion of twice the period, displaced along the eigenvector of -1."""

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cache, partial
 from itertools import pairwise
 from time import perf_counter
 from typing import Any
@@ -20,6 +21,7 @@ from brakecli.analysis.branches.problem import Array, Problem
 from brakecli.analysis.branches.rough_cycles import RoughCycles
 from brakecli.analysis.branches.rows import FORCED, IN_SLIDING, LIMIT_CYCLE, Followed, Mark, of_branch, of_sliding
 from brakecli.analysis.branches.sliding import Change, Slide, Sliding
+from brakecli.analysis.branches.stable_parts import unstable_spans
 from brakecli.analysis.branches.starts import settle
 from brakecli.analysis.branches.switch import switch
 from brakecli.analysis.stability.modes import is_undamped
@@ -160,10 +162,14 @@ class Explorer:
         """Follow the branch of a motion along its tangent, or both ways if it lies `within` it."""
         how = self._settings(), self._until(problem, first), self.stop
         branch = both_ways(problem, first, *how) if within else follow(problem, first, None, *how)
-        self.branches.append(replace(of_branch(self.line, branch, problem, kind, change, changes), note=note))
+        followed = replace(of_branch(self.line, branch, problem, kind, change, changes), note=note)
+        self.branches.append(replace(followed, unstable=cache(partial(self._unstable, followed))))
         for other in branch.aside:
             if not (self._over() or any(passes(followed, other) for followed in self.branches)):
                 self._follow(problem, other, kind, note, within=True)
+
+    def _unstable(self, followed: Followed) -> list[tuple[float, float]]:
+        return [(self.line.value(low), self.line.value(high)) for low, high in unstable_spans(followed)]
 
     def _settings(self) -> Settings:
         seconds = max(self.end - perf_counter(), 0.0)
@@ -321,6 +327,8 @@ class Explorer:
                 if first is None:
                     self.notes.append(f"no motion of twice the period was found at the flip at {value:.6g}")
                     continue
+                if self._is_followed(first):
+                    continue  # the branch from another flip has ended here
                 self._follow(problem, first, origin.kind, f"twice the period, from the flip at {value:.6g}")
 
 

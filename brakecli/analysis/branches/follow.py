@@ -12,13 +12,14 @@ from brakecli.analysis.branches.corner import beyond_corner, led_on
 from brakecli.analysis.branches.newton import FROM_AFAR, LEFT, OFF, Newton, Settings
 from brakecli.analysis.branches.point import Branch, End, Point, Special
 from brakecli.analysis.branches.problem import Array, Problem
-from brakecli.analysis.branches.signs import GRID, special_points
+from brakecli.analysis.branches.signs import GRID, ONE_PLACE, special_points
 
 Until = Callable[[Point], str | None]
 """Called with each point; a reason ends the branch there."""
 Stop = Callable[[], bool]
 """Called before each stride; True ends the branch with the points found so far."""
 
+HALVED = End("halved", "it reaches the motion of half its period")
 RUNS_AGAIN = End("lost", "it is lost: it runs along itself again")
 
 
@@ -42,6 +43,10 @@ class Strides:
 
 
 STRIDES = Strides()
+MET = 1e-5
+"""Length from the last point to the motion of half the period, at which a branch ends there; a choice."""
+SHORT_OF_MEETING = 0.9
+"""Part of the way to that motion that a stride takes, as it is guessed by a straight line; a choice."""
 SAME_P = 1e-6
 """Change of p by a new chart, beyond which another motion was found."""
 MEET = 1e-3
@@ -101,6 +106,12 @@ def _finish(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branc
     for point, end in ((points[0], ended[0]), (points[-1], ended[1])):
         if end.kind != "start":
             error = 0.0 if end.kind in ("range", "closed", "stopped") else walk.settings.shortest
+            if end.kind == "halved":  # there one multiplier is 1
+                specials = [
+                    each
+                    for each in specials
+                    if each.kind not in ("fold", "branch point") or abs(each.s - point.s) >= ONE_PLACE
+                ]
             specials.append(Special("end", point.p, error, point, point.s, end.reason))
     specials.sort(key=lambda special: special.s)
     aside = [new for _, new in walk.aside]
@@ -158,6 +169,11 @@ class _Walk:
                     return points, self._lost(here)
                 stride = settings.border
             else:
+                if (way := self._to_half(here, new)) is not None:
+                    if way < MET:
+                        return points, HALVED
+                    stride = SHORT_OF_MEETING * way
+                    continue
                 shorter, longer = self._stride(here, new, stride)
                 if shorter:
                     stride = shorter
@@ -183,6 +199,19 @@ class _Walk:
                 self.problem.use(new.chart)
             if (renewed := self._renewed(new)) is not None:
                 points.append(renewed)
+
+    def _to_half(self, here: Point, new: Point) -> float | None:
+        """How far ahead of a point the branch meets the motion of half the period; None if not in this stride.
+
+        Beyond it the same motions follow once more, half of their period later.
+        """
+        if here.chart is not new.chart:
+            return None
+        one = self.problem.halved(here)
+        other = self.problem.halved(new)
+        if one is None or other is None or float(one @ other) >= 0.0:
+            return None
+        return (new.s - here.s) * float(one @ one) / float(one @ (one - other))
 
     def _range_end(self, p: float) -> End:
         return End("range", f"it reaches the {'lower' if p == self.settings.low else 'upper'} end of the range")

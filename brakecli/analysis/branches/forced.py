@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.branches.cycles import cyclic
+from brakecli.analysis.branches.cycles import changed_phases, cyclic
 from brakecli.analysis.branches.extent import Extent, extent
 from brakecli.analysis.branches.follow import follow
 from brakecli.analysis.branches.frame import NO_PERIOD, Frame, frame_of, resting
@@ -216,9 +216,20 @@ class Forced(Doubled):
                 return np.asarray(((beside.ends - flown.ends) / step).ravel())
         return None
 
+    def halved(self, point: Point) -> Array | None:
+        """By what half of its common periods moves a motion, if they are an even number."""
+        if self.periods % 2:
+            return None
+        first, second = np.split(point.u, 2)
+        return np.asarray(second - first)
+
     def border(self, before: Any, after: Any) -> str:
         """What one of two sequences of phases has more of. Lift-off is no border, as the force is continuous."""
         return "sequence of events changes" if before.count(STICK) == after.count(STICK) else "grazing stick"
+
+    def change(self, before: Any, after: Any) -> str:
+        """What begins or ends from one sequence of phases to another."""
+        return changed_phases(before, after)
 
     def double(self, point: Point, vector: Array) -> Guess:
         """The motion of half the periods, twice, displaced along the eigenvector of -1."""

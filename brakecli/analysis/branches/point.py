@@ -72,7 +72,7 @@ class End(NamedTuple):
     """Why a branch ends."""
 
     kind: str
-    """range, closed, lost, stopped, points, seconds, interrupted, or start, where it was not followed further."""
+    """range, closed, halved, lost, stopped, points, seconds, interrupted, or start, where it was begun."""
     reason: str
     """For a reader."""
 
@@ -92,6 +92,8 @@ class Special:
     """What is grazed, or the reason of the end."""
     turns: bool = False
     """Whether the parameter turns here."""
+    change: str = ""
+    """What begins or ends along the branch where something is grazed."""
 
 
 @dataclass(slots=True, eq=False)

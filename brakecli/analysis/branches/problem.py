@@ -78,9 +78,20 @@ class Problem(Protocol):
         """Say where the point lies in another chart. None: it cannot be said. The chart in use does not change."""
         return None
 
+    def halved(self, point: "Point") -> Array | None:
+        """By what half of its period moves a motion: by nothing where it is one of half the period, twice.
+
+        None: the motion is not one that begins at a flip.
+        """
+        return None
+
     def border(self, before: Hashable, after: Hashable) -> str:
         """Name what happens between two words, for a reader."""
         return "sequence of events changes"
+
+    def change(self, before: Hashable, after: Hashable) -> str:
+        """Say what begins or ends between two words, for a reader; empty where that is not known."""
+        return ""
 
 
 class Doubled(Problem, Protocol):

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -47,7 +48,7 @@ class Row:
 
 @dataclass(frozen=True, slots=True)
 class Mark:
-    """A special point of a branch; error in the unit of the value, and why, where the branch ends."""
+    """A special point of a branch; error in the unit of the value, and why, or what begins or ends there."""
 
     motion: Motion
     kind: str
@@ -65,6 +66,18 @@ class Followed:
     branch: Branch | None = None
     problem: Any = None
     note: str = ""
+    unstable: Callable[[], list[tuple[float, float]]] = list
+    """The values between which it is not stable, in its order; computed where they are asked for."""
+
+    @property
+    def unstable_lower(self) -> list[float]:
+        """Lower ends of the intervals in which it is unstable."""
+        return [low for low, _ in self.unstable()]
+
+    @property
+    def unstable_upper(self) -> list[float]:
+        """Their upper ends."""
+        return [high for _, high in self.unstable()]
 
     @property
     def ended(self) -> list[Mark]:
@@ -99,7 +112,27 @@ def of_sliding(sliding: Sliding, slides: list[Slide], changes: list[Change]) -> 
             whole = slide.p == (0.0 if end == "lower" else 1.0)
             why = f"it reaches the {end} end of the range" if whole else "there is no steady sliding beyond"
             marks.append(Mark(_at_rest(line, slide, 0.0), "end", 0.0, why))
-    return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.motion.value))
+    unstable = partial(_unstable, line, slides, changes)
+    return Followed(SLIDING, rows, sorted(marks, key=lambda mark: mark.motion.value), unstable=unstable)
+
+
+def _unstable(line: Line, slides: list[Slide], changes: list[Change]) -> list[tuple[float, float]]:
+    """The values between which steady sliding is not stable, up to the changes beside its places."""
+    found = list[tuple[float, float]]()
+    at = [change.p for change in changes]
+    for grows, group in groupby(
+        range(len(slides)), lambda k: slides[k].eigenvalues is not None and not slides[k].stable
+    ):
+        if grows:
+            places = [*group]
+            first = slides[places[0]].p
+            last = slides[places[-1]].p
+            before = slides[max(places[0] - 1, 0)].p
+            after = slides[min(places[-1] + 1, len(slides) - 1)].p
+            low = max((p for p in at if before <= p <= first), default=first)
+            high = min((p for p in at if last <= p <= after), default=last)
+            found.append((line.value(low), line.value(high)))
+    return found
 
 
 def _modes(slide: Slide) -> tuple[Mode, ...]:
@@ -169,5 +202,5 @@ def _mark(line: Line, special: Special, problem: Any, ended: Sequence[End] = ())
         _moving(line.value(special.p), special.point, problem),
         "budget" if special.kind == "end" and cut else kind,
         special.error * abs(line.high - line.low),
-        special.name if special.kind == "end" else "",
+        special.name if special.kind == "end" else special.change,
     )

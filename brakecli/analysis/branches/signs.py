@@ -114,7 +114,8 @@ def _borders(newton: Newton, points: list[Point], over: Over) -> tuple[list[Spec
             turns = float(near.tangent[-1] * far.tangent[-1]) < 0.0
             p = 0.5 * (near.p + far.p)
             s = 0.5 * (near.s + far.s)
-            specials.append(Special("grazing", p, error, near, s, name, turns))
+            change = newton.problem.change(near.word, far.word)
+            specials.append(Special("grazing", p, error, near, s, name, turns, change))
         k += 1
     return specials, ""
 

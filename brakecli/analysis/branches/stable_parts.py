@@ -43,6 +43,31 @@ def stable_parts(followed: Followed) -> list[Part]:
     return parts
 
 
+def unstable_spans(followed: Followed) -> list[Span]:
+    """Where a branch is not stable, from one end along it to the next, up to what bounds its stable parts.
+
+    The vibration at flutter is neutral, as sliding is: alone it is no span.
+    """
+    branch = followed.branch
+    points = branch.points if branch else []
+    neutral = [mark.motion.amplitude for mark in followed.special if mark.kind == "flutter"]
+    found = list[Span]()
+    for stable, group in groupby(range(len(points)), lambda k: points[k].stable):
+        places = [*group]
+        first = places[0]
+        last = places[-1]
+        if stable or (first == last in (0, len(points) - 1) and points[first].facts.amplitude in neutral):
+            continue
+        at = [points[k].p for k in places]
+        at += [_bound(followed, first - 1, 1).p] if first else []
+        at += [_bound(followed, last + 1, -1).p] if last + 1 < len(points) else []
+        turns = [each for each in branch.specials if each.kind == "fold"] if branch else []
+        at += [fold.p for fold in turns if points[first].s < fold.s < points[last].s]
+        if max(at) > min(at) + NARROWEST:
+            found.append((min(at), max(at)))
+    return found
+
+
 def _turns(followed: Followed, places: list[int], way: int) -> list[Bound]:
     """The inner point of a stable part that lies furthest in p, where one does: folds that rounding makes.
 

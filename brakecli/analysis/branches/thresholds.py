@@ -100,7 +100,7 @@ def _beside(answers: Answers, critical: float) -> str:
     further = {"budget": "; `brakecli branch` follows it further"}
     cut = [
         f"the branch is cut at {mark.motion.value:.4g}: {mark.reason}{further.get(mark.kind, '')}"
-        for mark in answers.cut[:1]
+        for _, mark in answers.cut[:1]
     ]
     cut += answers.explored.notes[:1]
     if not coexisting:
@@ -111,7 +111,7 @@ def _beside(answers: Answers, critical: float) -> str:
     edges = [line.high, critical, *answers.critical_windows_lower]
     reaches = any(abs(high - edge) <= REACHES * line.high for edge in edges)
     until = "on" if reaches else f"to {high:.4g}{' at least' if cut else ''}"
-    words = f"a vibration can exist from {low:.4g} {until}"
+    words = f"a vibration{answers.pushed} can exist from {low:.4g} {until}"
     if answers.barrier is not None:
         cycle = f"an unstable cycle of {metres(answers.barrier)} lies between the two"
         words += f"; at the case's {answers.own:.4g} {cycle}"

@@ -116,6 +116,8 @@ def _write_one(result: ResultFile, group: str, curve: Followed, units: str) -> N
     """A branch: its motions over `point`, and a group of its special points."""
     result.axis(group, integer("point", "number of the motion along the branch"), range(len(curve.points)))
     result.set_attributes({"kind": curve.kind, "note": curve.note}, group)
+    if lower := curve.unstable_lower:
+        result.set_attributes({"unstable_lower": lower, "unstable_upper": curve.unstable_upper}, group)
     if curve.points:
         result.axis(group, integer("multiplier", "number of the multiplier"), range(1, MULTIPLIERS + 1))
         result.axis(group, Field("part", "", "of a complex number", "S"), ["real", "imaginary"])

@@ -78,6 +78,9 @@ class Orbits(Doubled):
             maps.append(by_place)
         return Evaluation(gap, by_u, by_p if with_parameter else None, np.array(maps), self.k, places.copy())
 
+    def halved(self, point: Point) -> Array | None:
+        return None if self.k % 2 else np.subtract(*np.split(point.u, 2))
+
     def double(self, point: Point, vector: Array) -> Guess:
         places = point.u.reshape(self.k // 2, -1)
         out = [vector]
@@ -90,6 +93,11 @@ class Orbits(Doubled):
 def logistic(x: Array, r: float) -> tuple[Array, Array, Array]:
     """x -> r x (1 - x)."""
     return r * x * (1.0 - x), np.array([[r * (1.0 - 2.0 * x[0])]]), x * (1.0 - x)
+
+
+def bubble(x: Array, r: float) -> tuple[Array, Array, Array]:
+    """x -> x³ - (2 - r²) x: 0 flips at r = ±1, and between them x and -x follow each other where x² + r² = 1."""
+    return x**3 - (2.0 - r**2) * x, np.array([[3.0 * x[0] ** 2 - (2.0 - r**2)]]), 2.0 * r * x
 
 
 def delayed_logistic(x: Array, r: float) -> tuple[Array, Array, Array]:

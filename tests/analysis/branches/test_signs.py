@@ -13,7 +13,7 @@ from brakecli.analysis.branches.follow import both_ways, follow
 from brakecli.analysis.branches.newton import Newton, Settings, start
 from brakecli.analysis.branches.point import Branch, Special
 from brakecli.analysis.branches.switch import switch
-from tests.analysis.branches.problems import Given, Orbits, Roots, delayed_logistic, henon, logistic
+from tests.analysis.branches.problems import Given, Orbits, Roots, bubble, delayed_logistic, henon, logistic
 from tests.analysis.branches.test_follow import first_of, kinds, parabola
 
 
@@ -139,6 +139,26 @@ def test_the_logistic_map_doubles_at_3_and_at_1_plus_the_root_of_6() -> None:
         assert sorted(point.u) == pytest.approx(
             [(r + 1.0 - root) / (2.0 * r), (r + 1.0 + root) / (2.0 * r)], abs=1e-8
         )
+
+
+def test_a_doubled_branch_ends_where_it_meets_the_motion_of_half_its_period_again() -> None:
+    """A half of the circle x² + r² = 1: the other half is the same motions, half of their period later."""
+    once = Orbits(bubble, -1.5, 1.5)
+    twice = Orbits(bubble, -1.5, 1.5, 2)
+    flips = located(both_ways(once, first_of(once, [0.0], 0.5)), "flip")
+    assert [once.value(flip.p) for flip in flips] == pytest.approx([-1.0, 1.0], abs=1e-8)
+    for flip, other in (flips, flips[::-1]):
+        first = switch(twice, flip.point)
+        assert first is not None
+        branch = follow(twice, first, None)
+        assert [end.kind for end in branch.ended] == ["start", "halved"]
+        assert [special.kind for special in branch.specials] == ["end"]
+        assert branch.points[-1].p == pytest.approx(other.p, abs=1e-8)
+        for point in branch.points:
+            assert point.u[0] * first.u[0] > 0.0
+            assert point.u[0] ** 2 + twice.value(point.p) ** 2 == pytest.approx(1.0, abs=1e-6)
+            assert point.u[1] == pytest.approx(-point.u[0], abs=1e-6)
+        assert branch.points[-1].s > 1.0
 
 
 def test_the_henon_map_folds_and_doubles_as_its_closed_forms_say() -> None:

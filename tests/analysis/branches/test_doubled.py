@@ -1,0 +1,112 @@
+"""Motions of twice the period on a shoe whose cycle flips, grazes stick, and flips twice more."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from brakecli.analysis.branches.answers import Answers
+from brakecli.analysis.branches.cycles import changed_phases
+from brakecli.analysis.branches.explore import Explorer
+from brakecli.analysis.branches.line import Line
+from brakecli.case.case import Case
+from brakecli.solver.phases import BACKWARD, FORWARD, OPEN, STICK
+from tests.analysis.branches.phasewise import Phasewise
+from tests.analysis.shoes import Shoe
+
+pytestmark = pytest.mark.usefixtures("compiled")
+
+TABLES: dict[str, Any] = {
+    "shoe": {"mass": 1.7},
+    "wheel": {"radius": 0.2, "angular_speed": 0.4328},
+    "link1": {"stiffness": 340790.0, "damping": 5.1586, "angle_deg": -2.2099},
+    "link2": {"stiffness": 6444240.0, "damping": 4.2004, "angle_deg": 11.5012},
+    "load": {"force": 1500.0},
+    "friction": {"coefficient": 0.35},
+    "contact": {"half_length": 0.03, "stiffness": 5.0e7},
+    "solver": {"tolerance": 1e-5, "duration": "settled"},
+}
+LEAVES = {
+    "wheel": {"radius": 0.2, "angular_speed": 2.5},
+    "link1": {"stiffness": 2.1e6, "damping": 30.0, "angle_deg": 3.0},
+    "link2": {"stiffness": 5.5e6, "damping": 25.0, "angle_deg": 12.0},
+}
+"""Another shoe, whose cycle loses its stability where it begins to stick."""
+
+
+def answers_of(tables: dict[str, Any], high: float, pushes: int = 0) -> Answers:
+    line = Line(Case.model_validate(tables), ["friction.coefficient"], 0.0, high)
+    return Answers(Explorer(line, lambda *_: None).explore(switches=True, pushes=pushes), line.own)
+
+
+@pytest.fixture(scope="module")
+def found() -> Answers:
+    return answers_of(TABLES, 1.0, 128)
+
+
+def test_a_doubled_branch_is_followed_once_between_the_places_where_it_is_born(found: Answers) -> None:
+    _, mother, *doubled, _ = found.branches
+    assert [each.note[:16] for each in doubled] == ["twice the period"] * 2
+    first, second, third = (mark.motion.value for mark in mother.special if mark.kind == "flip")
+    (stick,) = [
+        mark.motion.value for mark in mother.special if "stick" in mark.kind and mark.motion.value > first
+    ]
+    for branch, begin, end in zip(doubled, (first, second), (stick, third), strict=True):
+        *marks, last = branch.special
+        assert branch.points[0].motion.value == pytest.approx(begin, abs=1e-4)
+        assert last.motion.value == pytest.approx(end, abs=1e-6)
+        assert last.reason == "it reaches the motion of half its period"
+        assert len({round(mark.motion.value, 6) for mark in marks}) == len(marks)
+
+
+def test_a_doubled_branch_is_no_loss_and_one_vibration_is_named_once(found: Answers) -> None:
+    assert "cut" not in found.sentence
+    begin = f"{found.coexists_from:.4g}"
+    assert found.sentence.count(f"from {begin} on") == 1
+    assert ", found in 640 pushes, can exist beside stable sliding" in found.sentence
+    assert "another" not in found.sentence
+
+
+def test_a_branch_that_is_cut_is_named() -> None:
+    line = Line(Case.model_validate(TABLES), ["friction.coefficient"], 0.0, 1.0)
+    cut = Answers(Explorer(line, lambda *_: None, points=30).explore(), line.own)
+    assert "; branch 1 is cut at 0." in cut.sentence
+
+
+def test_where_a_cycle_is_unstable_differences_of_another_scheme_grow() -> None:
+    """The cycle loses its stability as it begins to stick, by a jump of multipliers, and regains it at a torus.
+
+    Of the four multipliers by central differences the one nearest to 1 belongs to the direction of the flow.
+    """
+    cycle = answers_of(TABLES | LEAVES, 1.2).branches[1]
+    ((low, high),) = cycle.unstable()
+    torus, stick = (
+        next(mark.motion.value for mark in cycle.special if kind in mark.kind) for kind in ("torus", "stick")
+    )
+    assert (low, high) == pytest.approx((stick, torus), abs=1e-5)
+    assert cycle.branch is not None
+    for row, point in zip(cycle.points[1:], cycle.branch.points[1:], strict=True):
+        value = row.motion.value
+        if not low - 0.05 < value < high + 0.05 or min(abs(value - low), abs(value - high)) < 2e-3:
+            continue
+        motion = Phasewise(Shoe.of(TABLES | LEAVES | {"friction": {"coefficient": value}}))
+        facts: Any = point.facts
+        start = np.array(facts.state)
+        whole = motion(start, facts.period)
+        scales = whole.high - whole.low
+        by_state = np.empty((4, 4))
+        for k, step in enumerate(1e-6 * np.diag(scales)):
+            ends = [motion(start + way * step, facts.period).end for way in (1.0, -1.0)]
+            by_state[:, k] = (ends[0] - ends[1]) / (2e-6 * scales)
+        multipliers = np.linalg.eigvals(by_state)
+        others = np.delete(multipliers, np.argmin(np.abs(multipliers - 1.0)))
+        assert bool(np.abs(others).max() > 1.0) is (low < value < high)
+
+
+def test_what_is_said_of_a_border_is_what_begins_or_ends_there() -> None:
+    assert changed_phases((BACKWARD,), (BACKWARD, STICK)) == "stick begins"
+    assert changed_phases((BACKWARD, STICK, OPEN), (BACKWARD, OPEN)) == "stick ends"
+    assert changed_phases((BACKWARD, STICK), (BACKWARD, STICK, OPEN)) == "flight begins"
+    assert changed_phases((STICK, FORWARD), (STICK, FORWARD, STICK, BACKWARD)) == "stick once more"
+    assert changed_phases((BACKWARD, FORWARD, STICK), (BACKWARD, STICK)) == "slip forwards ends"
+    assert changed_phases((BACKWARD, OPEN, STICK), (BACKWARD, STICK, OPEN)) == ""
