@@ -86,7 +86,7 @@ def explorer_of(
 ) -> tuple[Explorer, Callable[[], Answers]]:
     """What follows the branches of a case, and the call that does so, also from the ends of the runs `starts`."""
     from brakecli.analysis.branches.explore import Explorer
-    from brakecli.studies.runs.branch import branch, line_of, start_of, states_of
+    from brakecli.studies.runs.branch import branch, foreign, line_of, start_of, states_of
     from brakecli.studies.runs.limits import within_range
 
     keys, low, high = ends_of(options.parameter)
@@ -95,8 +95,10 @@ def explorer_of(
     named = f"{argument('parameter')} {parameter}" if isinstance(parameter, str) else argument("parameter")
     with within_range():
         line = line_of(loaded, keys, low, high, named)
-    states = states_of(line, [start_of(path, keys) for path in starts])
+    given = [start_of(path, keys) for path in starts]
+    states = states_of(line, given)
     explorer = Explorer(line, tell)
+    explorer.notes += foreign(line, given)
     return explorer, partial(branch, explorer, states, options.switch, pushes)
 
 

@@ -354,6 +354,22 @@ def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path
     assert answer["coexists_from"] == 0.2
 
 
+def test_a_run_of_another_case_is_said_to_be_one(here: Path, tmp_path: Path) -> None:
+    """Keys that do not enter the equations of motion, and the one that is followed, may differ."""
+    case = str(here / "branch.toml")
+    own = tomllib.loads((here / "branch.toml").read_text())["link1"]["damping"]
+    said = []
+    for damping in (own, own + 1.5):
+        settings = (f"link1.damping={damping}", "friction.coefficient=0.6", "solver.duration=0.01", 'title="it"')
+        words = [word for each in settings for word in ("--set", each)]
+        command("run", case, *words, "-q", "-o", "r.h5", "--force", cwd=tmp_path).told(0)
+        answer = answer_of(tmp_path, "branch", case, *FRICTION, "--start", "r.h5", "--pushes", "0")
+        said.append("another case" in answer["sentence"])
+    assert said == [False, True]
+    compared = f"link1.damping {own + 1.5:.6g}, not {own:.6g}"
+    assert f"the motion given for 0.6 is one of another case ({compared});" in answer["sentence"]
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -18,12 +18,14 @@ from brakecli.case.restart import last_of
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 from brakecli.results import stability_fields as fields
-from brakecli.results.field import LARGEST_SQUARE, Field, integer, values_of
+from brakecli.results.field import LARGEST_SQUARE, Field, flat, integer, values_of
 from brakecli.results.write import ResultFile, new_result
 from brakecli.solver.arrays import Floats
 from brakecli.studies.runs.run import origin
 
 MULTIPLIERS = 4
+NAMED = 3
+"""Keys that a note names; a choice."""
 EQUATIONS = ALONE | {"roughness"}
 """Tables of a case whose keys enter the equations of motion."""
 
@@ -34,6 +36,7 @@ class Start:
 
     state: Floats  # x, y, v_x and v_y
     value: float | None  # of the keys in the case of the run; None where they differ
+    case: Case  # of the run
 
 
 def line_of(loaded: LoadedCase, keys: Sequence[str], low: float, high: float, option: str) -> Line:
@@ -75,21 +78,52 @@ def parsed(text: str) -> tuple[tuple[str, ...], float, float]:
 def start_of(path: Path, keys: Sequence[str]) -> Start:
     """The last state of a run, and the value of the keys in its case; raises what `last_of` raises."""
     end = last_of(path, Case.model_validate)
-    return Start(np.array(end.state), Line(end.case, keys, -math.inf, math.inf).own)
+    return Start(np.array(end.state), Line(end.case, keys, -math.inf, math.inf).own, end.case)
 
 
 def states_of(line: Line, starts: Sequence[Start]) -> list[tuple[float, Floats]]:
     """Places of a line and the states there from which branches are begun; raises UsageError."""
-    states = []
+    return [(line.place(_value(line, start)), start.state) for start in starts]
+
+
+def _value(line: Line, start: Start) -> float:
+    value = line.own if start.value is None else start.value
+    if value is None or not line.low <= value <= line.high:
+        raise UsageError(
+            f"{argument('start')}: the value of {', '.join(line.keys)} in its case is not in the range; "
+            f"widen {argument('parameter')}"
+        )
+    return value
+
+
+def foreign(line: Line, starts: Sequence[Start]) -> list[str]:
+    """What is to be known of runs whose case has other equations of motion than the line, in words."""
+    own = _equations(line.case, line.keys)
+    notes = []
     for start in starts:
-        value = line.own if start.value is None else start.value
-        if value is None or not line.low <= value <= line.high:
-            raise UsageError(
-                f"{argument('start')}: the value of {', '.join(line.keys)} in its case is not in the range; "
-                f"widen {argument('parameter')}"
+        there = _equations(start.case, line.keys)
+        differing = [name for name in {**own, **there} if own.get(name) != there.get(name)]
+        if differing:
+            shown = [_compared(name, there.get(name), own.get(name)) for name in differing]
+            more = f", and {len(shown) - NAMED} more" if len(shown) > NAMED else ""
+            value = _value(line, start)
+            notes.append(
+                f"the motion given for {value:.6g} is one of another case ({', '.join(shown[:NAMED])}{more})"
             )
-        states.append((line.place(value), start.state))
-    return states
+    return notes
+
+
+def _equations(case: Case, keys: Sequence[str]) -> dict[str, object]:
+    """The keys of a case that enter the equations of motion, but for some, with their values."""
+    tables = case.model_dump(mode="json", include=EQUATIONS)
+    return {name: value for name, value in flat(tables) if name not in keys}
+
+
+def _compared(name: str, there: object, own: object) -> str:
+    """A key with both of its values, where they are numbers."""
+    if isinstance(there, int | float) and isinstance(own, int | float):
+        return f"{name} {there:.6g}, not {own:.6g}"
+    return name
 
 
 def branch(

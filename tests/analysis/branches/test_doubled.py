@@ -48,9 +48,7 @@ def test_a_doubled_branch_is_followed_once_between_the_places_where_it_is_born(f
     _, mother, *doubled, _ = found.branches
     assert [each.note[:16] for each in doubled] == ["twice the period"] * 2
     first, second, third = (mark.motion.value for mark in mother.special if mark.kind == "flip")
-    (stick,) = [
-        mark.motion.value for mark in mother.special if "stick" in mark.kind and mark.motion.value > first
-    ]
+    (stick,) = [mark.motion.value for mark in mother.special if "stick" in mark.kind and mark.motion.value > first]
     for branch, begin, end in zip(doubled, (first, second), (stick, third), strict=True):
         *marks, last = branch.special
         assert branch.points[0].motion.value == pytest.approx(begin, abs=1e-4)
