@@ -11,7 +11,7 @@ import numpy as np
 from brakecli.analysis.branches.answers import Answers
 from brakecli.analysis.branches.explore import Explorer
 from brakecli.analysis.branches.line import ALONE, Line
-from brakecli.analysis.branches.rows import Followed
+from brakecli.analysis.branches.rows import Followed, finer
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.restart import last_of
@@ -133,7 +133,10 @@ def branch(
 
     Others are sought by five times so many `pushes`.
     """
-    return Answers(explorer.explore(states, switch, pushes), explorer.line.own)
+    explored = explorer.explore(states, switch, pushes)
+    drawn = {id(followed): finer(explorer.line, followed, explorer.stop) for followed in explored.branches}
+    search = replace(explored.search, islands=[drawn[id(followed)] for followed in explored.search.islands])
+    return Answers(replace(explored, branches=[*drawn.values()], search=search), explorer.line.own)
 
 
 def write(path: Path, loaded: LoadedCase, answers: Answers, units: str, *, force: bool) -> None:

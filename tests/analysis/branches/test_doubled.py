@@ -7,10 +7,11 @@ import pytest
 
 from brakecli.analysis.branches.answers import Answers
 from brakecli.analysis.branches.cycles import changed_phases
-from brakecli.analysis.branches.explore import Explorer
+from brakecli.analysis.branches.explore import Explorer, crossing
 from brakecli.analysis.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.solver.phases import BACKWARD, FORWARD, OPEN, STICK
+from brakecli.studies.runs.branch import branch
 from tests.analysis.branches.phasewise import Phasewise
 from tests.analysis.shoes import Shoe
 
@@ -49,9 +50,9 @@ def test_a_doubled_branch_is_followed_once_between_the_places_where_it_is_born(f
     assert [each.note[:16] for each in doubled] == ["twice the period"] * 2
     first, second, third = (mark.motion.value for mark in mother.special if mark.kind == "flip")
     (stick,) = [mark.motion.value for mark in mother.special if "stick" in mark.kind and mark.motion.value > first]
-    for branch, begin, end in zip(doubled, (first, second), (stick, third), strict=True):
-        *marks, last = branch.special
-        assert branch.points[0].motion.value == pytest.approx(begin, abs=1e-4)
+    for each, begin, end in zip(doubled, (first, second), (stick, third), strict=True):
+        *marks, last = each.special
+        assert each.points[0].motion.value == pytest.approx(begin, abs=1e-4)
         assert last.motion.value == pytest.approx(end, abs=1e-6)
         assert last.reason == "it reaches the motion of half its period"
         assert len({round(mark.motion.value, 6) for mark in marks}) == len(marks)
@@ -99,6 +100,27 @@ def test_where_a_cycle_is_unstable_differences_of_another_scheme_grow() -> None:
         multipliers = np.linalg.eigvals(by_state)
         others = np.delete(multipliers, np.argmin(np.abs(multipliers - 1.0)))
         assert bool(np.abs(others).max() > 1.0) is (low < value < high)
+
+
+def test_straight_lines_between_the_motions_of_a_file_miss_little() -> None:
+    """Two thousandths of the range or of an amplitude, and a part for what neighbours do not tell of a stride."""
+    line = Line(Case.model_validate(TABLES | LEAVES), ["friction.coefficient"], 0.0, 1.2)
+    explorer = Explorer(line, lambda *_: None)
+    (cycle,) = branch(explorer).branches[1:]
+    missed = []
+    for rows in (explorer.branches[1].points, cycle.points):
+        drawn = np.array([(line.place(row.motion.value), np.log(row.motion.amplitude)) for row in rows])
+        chords = np.diff(drawn, axis=0)
+        lengths = np.maximum((chords**2).sum(axis=1), 1e-30)
+        away = []
+        for value in np.linspace(0.34, 1.19, 100).tolist():
+            (motion,) = crossing(cycle, line.place(value))
+            beside = np.array([motion.p, np.log(motion.facts.amplitude)]) - drawn[:-1]
+            parts = np.clip((beside * chords).sum(axis=1) / lengths, 0.0, 1.0)
+            away.append(np.linalg.norm(beside - parts[:, None] * chords, axis=1).min())
+        missed.append(max(away))
+    assert missed[0] > 0.01
+    assert missed[1] < 0.0025
 
 
 def test_what_is_said_of_a_border_is_what_begins_or_ends_there() -> None:
