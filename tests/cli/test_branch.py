@@ -3,6 +3,7 @@
 import subprocess
 import sys
 import tomllib
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, cast
@@ -13,7 +14,7 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 import brakecli
-from brakecli.analysis.branches.explore import Explorer
+from brakecli.analysis.branches.explore import MOST, Explorer
 from brakecli.api.inputs import load_case
 from brakecli.errors import UsageError
 from brakecli.results.field import Field, integer
@@ -167,17 +168,45 @@ def test_two_cycles_have_a_colour_each_and_two_thresholds_a_line_each_in_the_leg
     assert looks[0]._dash_pattern != looks[1]._dash_pattern
 
 
-def _write_branch(result: ResultFile, group: str, kind: str) -> None:
-    """A branch of two motions without special points."""
+def test_each_branch_has_a_colour_of_its_own_and_marks_of_a_kind_do_not_lie_on_each_other(tmp_path: Path) -> None:
+    """Of eleven folds a thousandth of the width apart one is drawn, and one that is half of the width away."""
+    with new_result(tmp_path / "many.h5", force=False) as result:
+        result.set_attributes({"kind": "branch", "parameter": "friction.coefficient"})
+        for number in range(MOST):
+            folds = [*(0.2 + 0.001 * np.arange(11)), 0.7] if number == 1 else []
+            _write_branch(result, f"branch_{number}", "limit cycle" if number else "steady sliding", folds)
+        result.commit()
+    with open_result(tmp_path / "many.h5") as stored, applied():
+        figure = draw(stored)
+    upper: Any = figure.axes[0]
+    drawn = [line for line in upper.get_lines() if len(line.get_xdata()) == 2 and line.get_label()[0] == "_"]
+    assert len({line.get_color() for line in drawn}) == MOST
+    marks = [float(line.get_xdata()[0]) for line in upper.get_lines() if line.get_label() == "fold"]
+    assert marks == [0.2, 0.7]
+
+
+def test_the_legend_lies_beside_the_curves(here: Path, found: dict[str, Any]) -> None:
+    for narrow in (False, True):
+        with open_result(here / "branch.h5") as stored, applied(narrow):
+            figure = draw(stored)
+            figure.draw_without_rendering()
+        box = figure.legends[0].get_window_extent()
+        panels = [axes.get_tightbbox() for axes in figure.axes]
+        assert not any(box.overlaps(panel) for panel in panels if panel)
+        assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
+
+
+def _write_branch(result: ResultFile, group: str, kind: str, folds: Sequence[float] = ()) -> None:
+    """A branch of two motions, with some folds."""
     result.axis(group, integer("point", "number"), range(2))
     result.set_attributes({"kind": kind}, group)
     for name in ("value", "amplitude", "frequency", "stable"):
         result.column(Field(name, "1", name), ("point",), [0.0, 1.0], group)
     inner = f"{group}/special"
-    result.axis(inner, integer("special", "number"), range(0))
+    result.axis(inner, integer("special", "number"), range(len(folds)))
     for name in ("value", "amplitude", "frequency"):
-        result.column(Field(name, "1", name), ("special",), [], inner)
-    result.column(Field("kind", "", "kind", "S16"), ("special",), [], inner)
+        result.column(Field(name, "1", name), ("special",), folds, inner)
+    result.column(Field("kind", "", "kind", "S16"), ("special",), ["fold"] * len(folds), inner)
 
 
 @pytest.mark.parametrize("variable", ["", "vx"])
@@ -185,7 +214,8 @@ def test_steady_sliding_stands_at_the_foot_of_a_logarithmic_axis(
     variable: str, here: Path, found: dict[str, Any]
 ) -> None:
     with open_result(here / "branch.h5") as stored, applied():
-        upper: Any = draw(stored, variable=variable).axes[0]
+        figure = draw(stored, variable=variable)
+    upper: Any = figure.axes[0]
     assert upper.get_yscale() == "log"
     low, _ = upper.get_ylim()
     lines = [each for each in upper.get_lines() if len(each.get_xdata()) > 1]
@@ -194,7 +224,7 @@ def test_steady_sliding_stands_at_the_foot_of_a_logarithmic_axis(
     assert len(sliding) == 2  # stable, and beyond flutter
     assert len({height for each in sliding for height in each}) == 1
     assert low < sliding[0][0] < others.min()
-    assert "steady sliding, amplitude 0" in [text.get_text() for text in upper.get_legend().get_texts()]
+    assert "steady sliding, amplitude 0" in [text.get_text() for text in figure.legends[0].get_texts()]
 
 
 def test_the_extent_and_the_means_of_motions_are_those_of_another_scheme(

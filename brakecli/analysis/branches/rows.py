@@ -227,7 +227,8 @@ def _bent(points: list[Point]) -> list[int]:
     cosines = np.sum(chords[1:] * chords[:-1], axis=1) / (lengths[1:] * lengths[:-1])
     turns = np.where(smooth[1:] & smooth[:-1], np.arccos(np.clip(cosines, -1.0, 1.0)), 0.0)
     angles = np.maximum(np.append(turns, 0.0), np.append(0.0, turns))
-    return np.array(strides)[smooth & (lengths * angles > 8.0 * STRAIGHT)].tolist()
+    bent = smooth & (lengths * angles > 8.0 * STRAIGHT)
+    return [k for k, far in zip(strides, bent.tolist(), strict=True) if far]
 
 
 def _moving(value: float, point: Point, problem: Any) -> Motion:

@@ -17,7 +17,12 @@ from brakecli.views.plots import style
 # inches
 _WIDTH = 8.8
 _HEIGHT = 6.6
-_COLOURS = style.BLUE, style.VERMILION, style.GREEN, style.ORANGE
+_OF_ALL = style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, "#CC79A7", "#56B4E9"  # Okabe and Ito
+_COLOURS = (*_OF_ALL, "#7F4F24", "#6A3D9A", "#808000", "#1A237E", "#B2182B")  # of twelve with steady sliding
+_SIZE = 4.0  # of a mark, in points
+_APART = 1.5  # widths of a mark by which two of one kind are drawn apart; a choice
+_IN_ROW = 4  # entries of the legend beside each other
+_ENTRY = 0.19  # inches, of its rows
 _MARKERS = {
     "flutter": "o",
     "divergence": "X",
@@ -84,7 +89,10 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     known = result.variables(groups[0])
     attributes = result.attributes
     lines = str(attributes.get("title", "")), str(attributes.get("sentence", ""))
-    figure = style.headed(_WIDTH, _HEIGHT, *lines, hspace=0.05)
+    kinds = {str(kind) for each in branches for kind in each.marks["kind"]} & {*filter(_MARKERS.get, _MARKERS)}
+    in_row = _IN_ROW // 2 if style.is_narrow() else _IN_ROW
+    rows = math.ceil((len(branches) + len(kinds) + len(_THRESHOLDS)) / in_row)
+    figure = style.headed(_WIDTH, _HEIGHT + _ENTRY * rows, *lines, hspace=0.05)
     heights = [1.6, 1.0][: len(names)]
     panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
     for axes, name in zip(panels, names, strict=True):
@@ -98,8 +106,10 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     units = style.unit_of(known["value"].attributes)
     style.set_ticks(panels[-1].xaxis, float(values.min()), float(values.max()), units, key)
     figure.align_ylabels()
+    for axes in panels:
+        _thin_marks(axes)
     shown = style.labels(panels[:1])
-    panels[0].legend(shown.values(), shown.keys(), loc="best")
+    figure.legend(shown.values(), shown.keys(), loc="outside lower center", ncols=in_row, frameon=False)
     return figure
 
 
@@ -168,11 +178,26 @@ def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str) -> None:
         axes.plot(columns["value"][inside], columns[name][inside], color=colour, **look)
 
 
+def _thin_marks(axes: Axes) -> None:
+    """Leave one of several marks of a kind, and of a branch, that would lie on each other."""
+    axes.get_xlim(), axes.get_ylim()  # so that they are those of all that is drawn
+    figure = axes.get_figure(root=True)
+    apart = _APART * _SIZE / 72.0 * figure.get_dpi() if figure else 0.0
+    kept = list[tuple[object, float, float]]()
+    for line in [each for each in axes.get_lines() if each.get_marker() not in ("None", "")]:
+        ((x, y),) = axes.transData.transform(line.get_xydata())
+        kind = line.get_label(), line.get_color()
+        if any(kind == other and math.hypot(x - a, y - b) < apart for other, a, b in kept):
+            line.remove()
+        else:
+            kept.append((kind, x, y))
+
+
 def _marks(axes: Axes, marks: dict[str, Any], name: str, colour: str, floor: float) -> None:
     """The special points, where they have this number."""
     if name not in marks:
         return
     for kind, value, height in zip(marks["kind"], marks["value"], marks[name], strict=True):
         if (marker := _MARKERS.get(str(kind))) and np.isfinite(height) and (name != "frequency" or height > 0.0):
-            look: dict[str, Any] = {"marker": marker, "ms": 5.5, "mfc": "white", "ls": "none", "zorder": 3.0}
+            look: dict[str, Any] = {"marker": marker, "ms": _SIZE, "mfc": "white", "ls": "none", "zorder": 3.0}
             axes.plot([float(value)], [max(float(height), floor)], color=colour, label=str(kind), **look)
