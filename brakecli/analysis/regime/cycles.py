@@ -1,5 +1,6 @@
 """What the cycles of a vibration show: amplitude, frequency, stick, force, and how far they drift."""
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -21,6 +22,8 @@ _SAME = 0.035  # squared difference, over twice the variance, between one period
 _AS_SAME = 4.0  # times the least of these, up to which a shorter period is the period
 _SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
 _EARLY = 1 / 8  # of a cycle: where it begins with a stick, a step may place that before its begin
+DRIFT = 5e-3
+"""Part by which amplitude or frequency of a settled limit cycle may be off, or change."""
 # of an amplitude and a period, per step in a contact: most that impacts were off
 SIZE_OFF = 3.5
 _PERIOD_OFF = 0.2
@@ -60,13 +63,14 @@ class Cycles:
     force_variation: float | None  # N, peak to peak of the friction force
 
 
-def cycles_of(stretch: Stretch, events: Events, step: float = 0.0) -> Cycles | None:
+def cycles_of(stretch: Stretch, events: Events, step: float = 0.0, known: float = math.nan) -> Cycles | None:
     """The cycles of a part by its events; None without cycles.
 
-    The spreads hold what a step (s) may change, with which the motion was computed. Stick, loss of contact and
-    frequency are medians of ten groups of cycles.
+    They are those of the limit cycle whose period (s) is `known`, where rises fit into it. The spreads hold what
+    a step (s) may change, with which the motion was computed. Stick, loss of contact and frequency are medians of
+    ten groups of cycles.
     """
-    begins, lag = _beginnings(stretch, events)
+    begins, lag = _beginnings(stretch, events, known)
     if len(begins) <= _FEWEST:
         return None
     cycles = len(begins) - 1
@@ -170,10 +174,11 @@ def _unseen(places: Array) -> tuple[float, float]:
     return float(gaps[longest]), float(places[longest] + 0.5 * gaps[longest])
 
 
-def _beginnings(stretch: Stretch, events: Events) -> tuple[Array, int]:
+def _beginnings(stretch: Stretch, events: Events, known: float) -> tuple[Array, int]:
     """When cycles begin (s), and how many rises of x each holds: after so many the motion repeats.
 
-    Rises are told from ripple by the first of `_BANDS` of the level of vx with which it does.
+    Rises are told from ripple by the first of `_BANDS` of the level of vx with which it does. Where its period (s)
+    is `known`, that says after how many: samples take rises for the same that differ by less than they show.
     """
     turning = events.kind <= MIN
     level = stretch.deviation("vx")
@@ -182,7 +187,12 @@ def _beginnings(stretch: Stretch, events: Events) -> tuple[Array, int]:
     mean = np.diff(stretch.last("x"))
     speed = np.diff(events.x[turning]) / np.maximum(np.diff(time), 1e-300)
     everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in _BANDS]
-    for begins in {len(times): times for times in everywhere if len(times) > 1}.values():
+    candidates = {len(times): times for times in everywhere if len(times) > 1}.values()
+    for begins in candidates:
+        lag = _fitting(known * (len(begins) - 1) / (begins[-1] - begins[0]))
+        if lag:
+            return begins[::lag], lag
+    for begins in candidates:
         rise = max((begins[-1] - begins[0]) / (len(begins) - 1) / interval, 1.0)
         lags = np.arange(1, _MOST_RISES_PER_CYCLE + 1)
         unlike = np.array([_unlike(mean, lag * rise) for lag in lags if lag * rise < len(mean) // 2])
@@ -190,6 +200,12 @@ def _beginnings(stretch: Stretch, events: Events) -> tuple[Array, int]:
             lag = 1 + int(np.argmax(unlike <= max(_SAME, _AS_SAME * unlike.min())))
             return begins[::lag], lag
     return everywhere[0], 1
+
+
+def _fitting(rises: float) -> int:
+    """How many whole rises these are, within what the frequency of a settled motion may be off; 0 for none."""
+    whole = round(rises) if math.isfinite(rises) else 0
+    return whole if abs(rises - whole) <= DRIFT * rises else 0
 
 
 def _unlike(values: Array, lag: float) -> float:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from brakecli.analysis.regime.answers import QUARTER, Answers, shown_after
-from brakecli.analysis.regime.cycles import SIZE_OFF, Cycles, contact_time, in_lines, median, swings
+from brakecli.analysis.regime.cycles import DRIFT, SIZE_OFF, Cycles, contact_time, in_lines, median, swings
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 from brakecli.analysis.regime.evidence import Stretch, tenths
 from brakecli.analysis.regime.forced_linear import RELAXED, ROOM, Lasting, forced_linear
@@ -24,7 +24,6 @@ _FEWEST_PIECES = 4
 _PIECES = 16
 _WIDER = 1.02  # times as far as in the last half of them, a transient swings
 _SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
-_DRIFT = 5e-3  # by which amplitude or frequency of a settled limit cycle may change
 _MODULATES = 0.1  # of a vibration, beside which waves count: smaller ones change its cycles, too
 _CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line is the frequency
 _AIM = 0.3  # part of what a settled cycle may be off, to which the requested step brings it; a choice
@@ -189,9 +188,9 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     whole = round(turns) if math.isfinite(turns) else 0
     detuned = abs(turns - whole) / turns
     nearest = min(off, abs(answers.amplitude - answers.amplitude_without_waves))  # cycles may be parts of it
-    apart = max(nearest / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / _DRIFT)
+    apart = max(nearest / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / DRIFT)
     far = not apart <= 1.0  # also where it is not known
-    if lasts and not (answers.waves or shown.context.step or far) and whole == 1:
+    if lasts and not (answers.waves or shown.context.step or far) and whole >= 1:
         return _on_orbit(numbers, shown.fate.orbit)
     longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
@@ -203,7 +202,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
             finer = shown.context.step * _AIM / apart  # large shifts grow less than with its square
             text += f"; if it stays as it is, its steps shift it: take a solver.step of {finer:.2g} s, or a"
             text += " solver.tolerance"
-    elif changed > _DRIFT:
+    elif changed > DRIFT:
         text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part: {longer}"
     elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
         text = f"the waves beat every {beat:.3g} s: run at least {ROOM * (stretch.start * interval + beat):.3g} s"

@@ -106,8 +106,10 @@ class Shown:
 
     @cached_property
     def cycles(self) -> Cycles | None:
-        """The cycles of the part that is judged."""
-        return cycles_of(self.judged, self.events, self.context.step)
+        """The cycles of the part that is judged; on a smooth wheel those of the limit cycle that it comes to."""
+        own = not (self.context.forced or self.context.frictionless)
+        known = self.fate.orbit.period if own and self.fate.orbit else math.nan
+        return cycles_of(self.judged, self.events, self.context.step, known)
 
     @cached_property
     def events(self) -> Events:
