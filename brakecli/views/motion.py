@@ -20,6 +20,7 @@ _WORDS = {
     Regime.DAMPED: "it does not vibrate by itself, what moves it dies away (damped)",
 }
 _FORCED = "it does not vibrate by itself, the roughness of the wheel shakes it (damped, forced)"
+_FEW_STICK = "it vibrates, without stick in most cycles (quasi-harmonic)"
 _LENGTH = re.compile(r"(\d+(?:\.\d+)?(?:e[-+]\d+)?) m(?![\w/²·])")
 _TORQUE = ("braking_torque", "torque_variation")
 _ASIDE = (
@@ -93,6 +94,8 @@ def motion_sentence(numbers: Mapping[str, Any], show: Renderer, *, full: bool = 
     words = {str(name): words for name, words in _WORDS.items()}.get(str(regime), "")
     if regime == Regime.DAMPED and numbers.get("excitation") == Excitation.FORCED:
         words = _FORCED
+    if regime == Regime.QUASI_HARMONIC and (numbers.get("stick_fraction") or 0.0) > 0.0:
+        words = _FEW_STICK
     if not words:
         bursts = len(numbers.get("bursts") or ())
         if bursts > 1 and reasons.startswith(f"in {bursts} bursts"):

@@ -201,6 +201,25 @@ def test_a_cycle_of_falls_that_differ_little_has_its_whole_period(
         assert verdict.amplitude == pytest.approx(amplitude, rel=1e-6)
 
 
+@pytest.mark.parametrize(
+    ("friction", "regime", "frequency", "modulation"),
+    [(0.59, Regime.UNDECIDED, 267.65, 27.33), (0.595, Regime.QUASI_HARMONIC, 267.26, 27.26)],
+)
+def test_a_torus_on_a_smooth_wheel_is_told(
+    friction: float, regime: Regime, frequency: float, modulation: float
+) -> None:
+    """The largest x of each cycle varies for good. Frequencies are those of another integrator."""
+    verdict = judged_in_memory(make(SHOES["turns on a torus"], friction__coefficient=friction))
+    assert verdict.regime is regime
+    assert verdict.evidence["frequency"] == pytest.approx(frequency, abs=0.05)
+    assert verdict.evidence["frequency_of_modulation"] == pytest.approx(modulation, abs=0.05)
+    assert len(verdict.reasons) == 1
+    assert "torus" in verdict.reasons[0]
+    assert not re.search("irregular|run ", verdict.reasons[0])
+    assert not verdict.unfinished
+    assert verdict.settled is (regime is Regime.QUASI_HARMONIC)
+
+
 def test_chaos_with_most_of_its_energy_in_three_bands_is_irregular() -> None:
     """Neighbouring runs part at 7.3 1/s, and the amplitude of a longer run is half, or two and a half times."""
     verdict = judged("chaotic")

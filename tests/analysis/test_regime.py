@@ -163,12 +163,12 @@ def test_what_dies_has_no_settled_amplitude_however_slowly_it_does() -> None:
     assert (verdict.regime, verdict.settled) == (Regime.DAMPED, False)
 
 
-def test_stick_in_some_cycles_only_is_irregular() -> None:
+def test_stick_in_some_cycles_only_is_neither() -> None:
     vx = 0.02 * np.sin(2 * np.pi * 170.0 * TIME)
     state = np.where((vx > 0.019) & (np.floor(170.0 * TIME) % 3 == 0), 0.0, -1.0)
     verdict = lasting(made(vx, state), Context(0.03))
     assert verdict.regime is Regime.UNDECIDED
-    assert "irregular" in verdict.reasons[0]
+    assert "with stick in 33% of the cycles, neither in most nor in few" in verdict.reasons[0]
 
 
 def test_lines_of_the_roughness_are_the_passing_frequency_and_its_multiples() -> None:

@@ -1,6 +1,7 @@
 """The table: each row and each threshold by a record of answers that trips it."""
 
 import math
+import re
 from dataclasses import fields, replace
 from typing import Any
 
@@ -116,7 +117,9 @@ SHAPE_ROWS: dict[str, dict[str, Any]] = {
     "shorter than two waves": {"slowest_wave_period": 3.0},
     "relaxation": {"stick_cycles": 0.9},
     "quasi-harmonic": {},
-    "irregular": {"stick_cycles": 0.5},
+    "torus": {"stick_cycles": 0.5, "frequency_of_modulation": 27.0},
+    "some cycles stick": {"stick_cycles": 0.5},
+    "irregular": {"harmonic_share": 0.5},
 }
 POWERS = (
     "forced, level",
@@ -198,7 +201,7 @@ def test_no_sentence_has_a_number_that_is_not_known() -> None:
         ("most", 20.0, {**FADING, **LASTS}, ("locked to the waves", "either")),
         ("fewest_cycles", 200.0, LASTS, ("quasi-harmonic", "few cycles")),
         ("samples_per_cycle", 30.0, LASTS, ("quasi-harmonic", "few samples in a cycle")),
-        ("stick_cycles", 0.4, {**LASTS, "stick_cycles": 0.5}, ("irregular", "relaxation")),
+        ("stick_cycles", 0.4, {**LASTS, "stick_cycles": 0.5}, ("some cycles stick", "relaxation")),
         ("harmonic_share", 0.4, {**LASTS, "harmonic_share": 0.5}, ("irregular", "quasi-harmonic")),
         (
             "band_share",
@@ -246,6 +249,27 @@ def test_a_regular_motion_of_a_phase_of_its_own_is_on_a_torus(changes: dict[str,
 def test_bands_that_are_no_multiples_of_one_frequency_are_those_of_a_torus_or_chaos() -> None:
     decided = decide(answers(**LASTS, harmonic_share=0.5, band_share=0.95), LIMITS)
     assert "95% of the energy of vx in three narrow bands, not multiples of one frequency" in decided.sentence
+
+
+@pytest.mark.parametrize(
+    ("sticks", "regime"),
+    [(1.0, "relaxation"), (0.5, "undecided"), (0.1, "quasi-harmonic"), (0.0, "quasi-harmonic")],
+)
+def test_a_torus_of_a_smooth_wheel_is_named_and_no_longer_run_is_asked_for(sticks: float, regime: str) -> None:
+    turns = {"stick_cycles": sticks, "frequency_of_modulation": 27.0}
+    decided = decide(answers(without_waves=Continuation.LASTS, **turns), LIMITS)
+    assert decided.regime == regime
+    assert "on a torus of two frequencies, 100 and 27 Hz" in decided.sentence
+    assert not re.search("irregular|chaos|run ", decided.sentence)
+    assert not decided.longer
+    bands = decide(answers(without_waves=Continuation.LASTS, harmonic_share=0.5, band_share=0.95, **turns), LIMITS)
+    assert "chaos" not in bands.sentence
+
+
+def test_what_lies_in_one_line_is_not_called_irregular() -> None:
+    decided = decide(answers(without_waves=Continuation.LASTS, stick_cycles=0.32), LIMITS)
+    assert "with stick in 32% of the cycles, neither in most nor in few: 100% of the energy" in decided.sentence
+    assert "irregular" not in decided.sentence
 
 
 @pytest.mark.parametrize(

@@ -119,3 +119,12 @@ def test_a_stop_is_headed_by_what_happens() -> None:
     assert len(re.findall(r"from \d", twice)) == 2
     many = motion_sentence({**stands, "vibrations": [interval] * 7}, TERMINAL)
     assert many.endswith(", and in 4 more intervals, then rests.")
+
+
+@pytest.mark.parametrize(
+    ("share", "said"), [(0.0, "without stick (quasi-"), (6.8e-4, "without stick in most cycles (quasi-")]
+)
+def test_no_vibration_that_sticks_is_said_to_be_without_stick(share: float, said: str) -> None:
+    reasons = ["the vibration lasts, with stick in 17% of the cycles"]
+    numbers = {"regime": "quasi-harmonic", "excitation": "self-excited", "stick_fraction": share}
+    assert said in motion_sentence({**numbers, "reasons": reasons}, TERMINAL)

@@ -110,6 +110,7 @@ class Answers(NamedTuple):
     frequency: float = math.nan  # of them
     samples_per_cycle: float = 0.0
     steps_per_cycle: float = math.inf  # where the case gives a step
+    frequency_of_modulation: float = math.nan  # at which their size turns on a torus, on a smooth wheel
     stick_cycles: float = math.nan
     harmonic_share: float = math.nan  # of one line and its multiples
     band_share: float = math.nan  # in three narrow bands, where the frequency does not wander
@@ -200,9 +201,16 @@ class Answers(NamedTuple):
         """Where the energy of vx lies."""
         if not self.band_share <= self.harmonic_share and math.isfinite(self.band_share):
             bands = f"{self.band_share:.0%} of the energy of vx in three narrow bands"
-            apart = self.harmonic_share < Thresholds.harmonic_share and not self.waves
+            known = self.waves or math.isfinite(self.frequency_of_modulation)
+            apart = self.harmonic_share < Thresholds.harmonic_share and not known
             return bands + ", not multiples of one frequency: a torus, or chaos" * apart
         return fill("{harmonic_share:.0%} of the energy of vx in one line and its harmonics", self)
+
+    @property
+    def turns(self) -> str:
+        """That the size of cycles turns on a torus, where it does on a smooth wheel."""
+        both = "{frequency:.4g} and {frequency_of_modulation:.4g} Hz"
+        return told(f"[; on a torus of two frequencies, {both}, it never repeats]", self)
 
     @property
     def torus(self) -> float:

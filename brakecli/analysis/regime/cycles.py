@@ -61,6 +61,7 @@ class Cycles:
     drift: tuple[float, float]  # change of the logarithm of the amplitude, with its error
     detuning: tuple[float, float]  # the same of the period
     force_variation: float | None  # N, peak to peak of the friction force
+    sizes: Array  # half of peak to peak of x in each cycle, m; empty where some hold no turning point
 
 
 def cycles_of(stretch: Stretch, events: Events, step: float = 0.0, known: float = math.nan) -> Cycles | None:
@@ -116,6 +117,7 @@ def cycles_of(stretch: Stretch, events: Events, step: float = 0.0, known: float 
         drift=level_change(sizes),
         detuning=level_change(np.diff(begins)),
         force_variation=_force_variation(stretch, begins / interval, groups / interval),
+        sizes=sizes,
     )
 
 

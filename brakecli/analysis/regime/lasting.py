@@ -190,13 +190,14 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     nearest = min(off, abs(answers.amplitude - answers.amplitude_without_waves))  # cycles may be parts of it
     apart = max(nearest / (shown.limits.settled_within * answers.amplitude_without_waves), detuned / DRIFT)
     far = not apart <= 1.0  # also where it is not known
+    turns_for_good = math.isfinite(answers.frequency_of_modulation)
     if lasts and not (answers.waves or shown.context.step or far) and whole >= 1:
         return _on_orbit(numbers, shown.fate.orbit)
     longer = f"run at least {shown_after(shown.duration, max(rate, 1e-9)):.3g} s for numbers that last"
     text: str | None = None
     if not lasts:
         text = f"this vibration may settle at only {rate:.2g} 1/s: {longer}" if answers.settled else None
-    elif not answers.waves and far:
+    elif not answers.waves and far and not turns_for_good:
         text = f"continued, this vibration comes to {answers.limit}: {longer}"
         if shown.context.step and apart < math.inf:
             finer = shown.context.step * _AIM / apart  # large shifts grow less than with its square

@@ -16,6 +16,7 @@ from brakecli.analysis.regime.decision import Thresholds
 from brakecli.analysis.regime.evidence import FEWEST_SAMPLES, LONGEST, Stretch, last_quarter, window_means
 from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.regime.statistics import Statistics
+from brakecli.analysis.regime.torus import turns_per_cycle
 from brakecli.analysis.stability.linear import Linear
 from brakecli.solver.history import History
 from brakecli.solver.phases import STICK
@@ -266,6 +267,10 @@ def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
         facts |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}
         if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
             facts["band_share"] = shown.judged.narrow()
+        if not waves and facts.get("without_waves") == Continuation.LASTS and shown.fate.orbit is None:
+            late = cycles.sizes[len(cycles.sizes) // 2 :]  # the level may settle before what modulates it
+            turns = turns_per_cycle(late, shown.limits.settled_within)
+            facts["frequency_of_modulation"] = turns * cycles.frequency
         if context.step:
             facts["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
     return facts

@@ -1,5 +1,7 @@
 """How a motion looks that lasts by itself: relaxation or quasi-harmonic, or what has to be known first."""
 
+import math
+
 from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.conditions import comes_to_it, regular, steady
 from brakecli.analysis.regime.decision import Excitation, Regime, Row, Thresholds
@@ -61,7 +63,7 @@ SHAPES: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "relaxation",
         lambda motion, limits: motion.stick_cycles >= limits.stick_cycles,
-        "with stick in {stick_cycles:.0%} of {cycles:.0f} cycles",
+        "with stick in {stick_cycles:.0%} of {cycles:.0f} cycles{turns}",
         "",
         Regime.RELAXATION,
         Excitation.SELF_EXCITED,
@@ -69,10 +71,22 @@ SHAPES: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "quasi-harmonic",
         lambda motion, limits: motion.stick_cycles <= 1.0 - limits.stick_cycles and regular(motion, limits),
-        "{sticks}: {lines}",
+        "{sticks}: {lines}{turns}",
         "",
         Regime.QUASI_HARMONIC,
         Excitation.SELF_EXCITED,
+    ),
+    Row(
+        "torus",
+        lambda motion, limits: math.isfinite(motion.frequency_of_modulation),
+        "{sticks}, neither in most nor in few{turns}",
+    ),
+    Row(
+        "some cycles stick",
+        regular,
+        "{sticks}, neither in most nor in few: {lines}",
+        "run longer, or look at the spectrum",
+        longer=True,
     ),
     Row(
         "irregular",
