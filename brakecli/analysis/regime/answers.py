@@ -210,7 +210,7 @@ class Answers(NamedTuple):
     def turns(self) -> str:
         """That the size of cycles turns on a torus, where it does on a smooth wheel."""
         both = "{frequency:.4g} and {frequency_of_modulation:.4g} Hz"
-        return told(f"[; on a torus of two frequencies, {both}, it never repeats]", self)
+        return fill(f"[; on a torus of two frequencies, {both}, it never repeats]", self)
 
     @property
     def torus(self) -> float:
