@@ -50,7 +50,7 @@ class Indices:
         if not joint:
             return ranking
         who = "" if len(first) == 1 else "each " if joint == first else f"{listed(joint)} "
-        return f"{ranking}, {who}together with the others"
+        return f"{ranking}, {who}together with the others (total shares: what several do together counts for each)"
 
     @classmethod
     def find(cls, of: str, names: tuple[str, ...], answers: Floats, seed: int) -> "Indices":
@@ -61,7 +61,10 @@ class Indices:
             other = "squeal" if of == "critical_friction" else "limits for the parameters"
             return cls(of, note=f"{missing} of {answers.size} samples {none}; ask for {other}")
         if np.ptp(answers) == 0.0:
-            return cls(of, note=f"all samples have the same {of.replace('_', ' ')}")
+            same = f"{of.replace('_', ' ')} is the same in all samples"
+            if of == "squeal":
+                same = "all samples squeal" if answers.flat[0] else "none of the samples squeals"
+            return cls(of, note=f"nothing decides on {of.replace('_', ' ')} here: {same}")
         if len(names) == 1:
             return cls(of, {names[0]: 1.0}, {names[0]: 1.0}, {names[0]: 0.0})
         first, total = _indices(answers)

@@ -42,6 +42,10 @@ _COLUMNS = 6  # of eight bytes that a file has beside its parameters
 _CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
 
 
+ELSEWHERE = {True: "are unstable outside that band", False: "are unstable without vibration"}
+"""What is said of samples that are unstable, but do not squeal: where there is a band, and where there is none."""
+
+
 class Distribution(NamedTuple):
     """Quantiles of a number of the samples."""
 
@@ -92,10 +96,25 @@ class ScatterReport:
         squeal, low, high = self.probabilities["squeal"]
         if self.failed == self.samples:
             return f"no sample has an answer: {self.first_failure}"
-        answer = f"{squeal:.1%} of such brakes squeal (95 %: {low:.1%} to {high:.1%})"
+        answer = f"{squeal:.1%} of such brakes squeal{self._where} (95 %: {low:.1%} to {high:.1%})"
+        if beside := float(np.mean(elsewhere(self.loaded.study, self.columns))):
+            answer += f"; {beside:.1%} {self._elsewhere}"
         if self.failed:
             answer += f"; {self.failed / self.samples:.1%} have no answer, and may squeal or not"
         return "; ".join(filter(None, (answer, self.indices.sentence)))
+
+    @property
+    def _where(self) -> str:
+        """The band in words; empty without one."""
+        band = self.loaded.study.band
+        return "" if band is None else f" between {band[0]:g} and {band[1]:g} Hz"
+
+    @property
+    def _elsewhere(self) -> str:
+        """What is said of brakes that are unstable, but do not squeal as the study counts it."""
+        if self.loaded.study.method == "run":
+            return "vibrate by themselves outside that band"
+        return ELSEWHERE[self.loaded.study.band is not None]
 
     def numbers(self) -> dict[str, Any]:
         """Names and values as `--json` gives them."""
@@ -318,6 +337,16 @@ def squeals(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]
         if study.method == "run":
             return np.asarray(within & (columns["excitation"] == Excitation.SELF_EXCITED.value.encode()))
         return np.asarray(within & (columns["growth_rate"] > 0.0))
+
+
+def elsewhere(study: Study, columns: dict[str, NDArray[Any]]) -> NDArray[np.bool_]:
+    """Which samples are unstable (of runs: vibrate by themselves) without squeal as the study counts it."""
+    if study.method == "run":
+        anyhow = squeals(study.model_copy(update={"band": None}), columns)
+    else:
+        with np.errstate(invalid="ignore"):
+            anyhow = np.asarray(columns["growth_rate"] > 0.0)
+    return anyhow & ~squeals(study, columns)
 
 
 def _write(result: ResultFile, report: ScatterReport) -> None:

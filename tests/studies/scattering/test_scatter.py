@@ -189,13 +189,14 @@ def test_others_are_named_where_the_joint_part_is_beyond_its_error() -> None:
         return Indices.find("squeal", study.names, answers, 0).sentence
 
     assert said(x[..., 0] + x[..., 1]).endswith("decide most on squeal, by 50% and 50%")
-    assert said(x[..., 0] * x[..., 1]).endswith(", each together with the others")
+    shares = " (total shares: what several do together counts for each)"
+    assert said(x[..., 0] * x[..., 1]).endswith(f", each together with the others{shares}")
     assert said(x[..., 0] * (1.0 + x[..., 1])).startswith(f"{first} decides most on squeal, by 1")
-    assert said(x[..., 0] * (1.0 + x[..., 1])).endswith("%, together with the others")
+    assert said(x[..., 0] * (1.0 + x[..., 1])).endswith(f"%, together with the others{shares}")
     assert "together" not in said(2.0 * x[..., 0] + x[..., 1])
     parts = {"a": 0.5, "b": 0.49}
     near = Indices("squeal", parts, parts, dict.fromkeys(parts, 0.02), {"a": False, "b": True})
-    assert near.sentence == "a and b decide most on squeal, by 50% and 49%, b together with the others"
+    assert near.sentence == "a and b decide most on squeal, by 50% and 49%, b together with the others" + shares
     assert Indices("squeal").sentence == ""
 
 
@@ -249,11 +250,18 @@ def test_a_study_finds_what_each_of_its_shoes_is_alone(tmp_path: Path) -> None:
 def test_a_band_tells_squeal_from_other_vibration(tmp_path: Path) -> None:
     path = write_study(tmp_path, FRICTION, ANGLE)
     shares = []
+    said = []
     for band in ([1.0, 100.0], [100.0, 250.0]):
-        report = brakecli.scatter(path, {"band": band, "samples": 64})
+        report = brakecli.scatter(path, {"band": band, "samples": 64, "indices_of": "squeal"})
         shares.append(float(report.probability.sel(outcome="squeal")))
+        said.append(str(report.attrs["sentence"]))
+        if band[0] == 1.0:
+            assert "nothing decides on squeal here: none of the samples squeals" in str(report.attrs["notes"])
     assert shares[0] == 0.0
     assert shares[1] == float(report.probability.sel(outcome="unstable")) > 0.0
+    assert said[0].startswith("0.0% of such brakes squeal between 1 and 100 Hz (95 %: 0.0% to 5.7%)")
+    assert said[0].endswith(f"; {shares[1]:.1%} are unstable outside that band")  # 5.7 %: Wilson's z²/(64 + z²)
+    assert "outside" not in said[1]
 
 
 @campaign
@@ -441,6 +449,7 @@ def test_a_shoe_that_locks_itself_is_unstable_and_past_its_critical_friction(tmp
     beyond = (report.friction_coefficient > alone.friction).to_numpy()
     assert 0 < beyond.sum() < 64
     assert ((report.growth_rate > 0.0).to_numpy() == beyond).all()
+    assert f"; {beyond.mean():.1%} are unstable without vibration" in str(report.attrs["sentence"])
     assert float(report.probability.sel(outcome="critical_below")) == beyond.mean()
 
 
