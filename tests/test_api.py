@@ -345,7 +345,8 @@ def test_advice_is_that_of_the_command(tmp_path: Path) -> None:
     assert best.squeal is not None
     margin = brakecli.stability(CASE, {best.parameter: best.to}).critical_friction / found.stability.friction - 1.0
     assert abs(margin - 0.3) < 1e-9
-    assert sentence(found.conclusion()) in " ".join(repr(found).split())
+    assert sentence(found.conclusion) in " ".join(repr(found).split())
+    assert f"{found.conclusion}" == found.conclusion() == numbers["conclusion"]
     assert brakecli.advise(CASE, keys="shoe.mass").advice[0].parameter == "shoe.mass"
 
 

@@ -37,3 +37,17 @@ class Probability(NamedTuple):
             return cls(value, float(wilson.low), float(wilson.high))
         half = float(stats.t.ppf(0.5 + 0.5 * LEVEL, len(shares) - 1)) * spread / math.sqrt(len(shares))
         return cls(value, max(value - half, 0.0), min(value + half, 1.0))
+
+
+def surely_fewer(hits: NDArray[np.bool_], before: NDArray[np.bool_]) -> bool:
+    """Whether a change surely leaves fewer hits: by the 95 % interval of the difference of the same samples.
+
+    Sets, samples. Sets differ as in `Probability.of` (Student's t); of a single one, and where no set differs,
+    the samples do.
+    """
+    change = hits.astype(float) - before
+    parts = change.mean(axis=1)
+    if len(parts) == 1 or np.ptp(parts) == 0.0:
+        parts = change.ravel()
+    error = float(parts.std(ddof=1)) / math.sqrt(len(parts))
+    return float(parts.mean()) + float(stats.t.ppf(0.5 + 0.5 * LEVEL, len(parts) - 1)) * error < 0.0

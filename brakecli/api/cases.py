@@ -125,7 +125,7 @@ def advise(options: Advise) -> "Advice":
 
     Returns:
         A record: `critical_friction`, `margin`, `stable`; `sensitivities` and `advice`, lists of records, of which
-        the first move most and help best; `check`, a run with the first advice followed; `conclusion()` and
+        the first move most and help best; `check`, a run with the first advice followed; `conclusion` and
         `notes()` in words; `numbers()` is what `brakecli advise --json` prints. Values have their keys' units.
 
     Raises:

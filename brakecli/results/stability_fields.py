@@ -212,6 +212,8 @@ _LEFT = (
     ),
     ratio("squeal_lower", "lower end of its 95 % interval"),
     ratio("squeal_upper", "upper end"),
+    ratio("unstable_elsewhere", "part that is unstable, but not in the band of the study; null without a study"),
+    Field("squeal_frequency", "Hz", "median frequency of those that are unstable; null where none vibrates"),
 )
 CHANGE = (
     Field("parameter", "", "key of the case", TEXT),

@@ -5,18 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
-from brakecli.analysis.stability.advice import rounded
+from brakecli.analysis.stability.advice import percent, rounded
 from brakecli.results import stability_fields as fields
 from brakecli.results.field import labelled
 from brakecli.views.render import Renderer, text_of
 from brakecli.views.view import SHORT_POINTS, Row, Table, View, details, sentence, sentences
 
 if TYPE_CHECKING:
-    from brakecli.analysis.stability.advice import Change
+    from brakecli.analysis.stability.advice import Change, Left
     from brakecli.studies.runs.advise import AdviceReport
 
 SHORT_ADVICE = 3
 """Keys to change, and notes, that are shown unless all are asked for."""
+MOVED = 0.05
+"""Part of a frequency beyond which it is said that it moves: less is not heard as another tone; a choice."""
 _MOVES = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %"
 _STATE = {True: "stable", False: "unstable", None: "-"}
 _MODES = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
@@ -178,16 +180,33 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
         ran = f"{check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
         blocks += details(Row("checked by a run", f"{ran}: {check.verdict.regime}"))
         blocks += details(Row("why", "; ".join(check.verdict.reasons)))
-    if report.advice:
-        advice = _advice(report.advice, report.squeal is not None)
-        first = max(SHORT_ADVICE - len(notes), 1)  # a short answer has twelve lines, and a note takes one of them
-        blocks.append(Table(advice, report.ranking, first=first))
+    if changes := _ordered([each for each in report.advice if each.to is not None], report.mildest):
+        apart = report.mildest not in (None, changes[0].parameter)
+        first = max(SHORT_ADVICE - len(notes), 1 + apart)  # a short answer has twelve lines; a note takes one
+        ranking = report.ranking + "; second, what leaves least squeal" * apart
+        blocks.append(Table(_advice(changes, report.squeal), ranking, first=first))
+    if vain := [each for each in report.advice if each.to is None]:
+        blocks.append(Table(_without_help(vain), "No help within bounds", first=0))
     if moves := _moves(report):
         blocks.append(Table(moves, _MOVES, first=0))
-    return View(report.title, [sentence(report.conclusion())], blocks)
+    return View(report.title, [sentence(report.conclusion)], blocks)
 
 
-def _advice(changes: Sequence[Change], under_scatter: bool) -> dict[str, list[str]]:
+def _ordered(changes: list[Change], mildest: str | None) -> list[Change]:
+    """The changes with the one that leaves least squeal second, if it is not first."""
+    rest = [each for each in changes[1:] if each.parameter != mildest]
+    return changes[:1] + [each for each in changes[1:] if each.parameter == mildest] + rest
+
+
+def _without_help(changes: Sequence[Change]) -> dict[str, list[str]]:
+    return {
+        "no help": [each.parameter for each in changes],
+        "from": [text_of(each.start) for each in changes],
+        "none in": [f"{each.lowest:.4g} to {each.highest:.4g}" for each in changes],
+    }
+
+
+def _advice(changes: Sequence[Change], drawn: Left | None) -> dict[str, list[str]]:
     columns = {
         "what helps": [each.parameter for each in changes],
         "from": [text_of(each.start) for each in changes],
@@ -196,10 +215,26 @@ def _advice(changes: Sequence[Change], under_scatter: bool) -> dict[str, list[st
         "safe until": [_until(each) for each in changes],
         "a run is": [each.check or "-" for each in changes],
     }
-    if under_scatter:
-        left = [each.squeal.squeal_probability if each.squeal else None for each in changes]
-        columns["squeals"] = ["-" if each is None else f"{100.0 * each:.2g} %" for each in left]
+    if drawn is None:
+        return columns
+    left = [each.squeal for each in changes]
+    beside = any(each.unstable_elsewhere for each in left if each)
+    columns["squeals"] = ["-" if each is None else percent(each.squeal_probability) for each in left]
+    if beside:
+        columns["unstable else"] = [
+            "-" if each is None else percent(each.unstable_elsewhere or 0.0) for each in left
+        ]
+    last = columns["unstable else" if beside else "squeals"]
+    last[:] = [f"{text}{_moved(each, drawn)}" for text, each in zip(last, left, strict=True)]
     return columns
+
+
+def _moved(left: Left | None, drawn: Left) -> str:
+    """The frequency of what is left of squeal, where it differs from that of the drawing by more than 5 %."""
+    if left is None or not left.squeal_frequency or not drawn.squeal_frequency:
+        return ""
+    far = abs(left.squeal_frequency / drawn.squeal_frequency - 1.0) > MOVED
+    return f", {left.squeal_frequency:.4g} Hz" if far else ""
 
 
 def _moves(report: AdviceReport) -> dict[str, list[str]]:
@@ -217,10 +252,8 @@ def _moves(report: AdviceReport) -> dict[str, list[str]]:
 
 
 def _until(change: Change) -> str:
-    """Where safe values end, rounded towards them; or where there are none."""
-    if change.to is None:
-        return f"none in {change.lowest:.4g} to {change.highest:.4g}"
-    return "-" if change.until is None else rounded(change.until, change.until < change.to)
+    """Where safe values end, rounded towards them."""
+    return "-" if change.until is None or change.to is None else rounded(change.until, change.until < change.to)
 
 
 def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer) -> View:

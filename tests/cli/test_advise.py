@@ -67,16 +67,18 @@ def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: 
     table = terminal_text(of_advice(report, TERMINAL), details=True)
     assert max(map(len, table.splitlines())) <= 80
     for words in (
-        "link2.angle_deg    5        7.692      0.84        89.99                damped",
-        "no help    -           none in 500 to",
+        "link2.angle_deg 5 7.692 0.84 89.99 damped",
+        "Confirmed by a run, smallest change first (by ratio; angles in radians): what helps",
+        "No help within bounds: no help from none in load.force 5000 500 to 5e+04",
     ):
-        assert words in table
+        assert words in " ".join(table.split())
     assert "\nSqueals at 174.3 Hz; sliding loses its stability" in table
     assert "\nchecked by a run   link2.angle_deg = 7.692, " in table
     short = terminal_text(of_advice(report, TERMINAL)).splitlines()
     assert len(short) <= 12
     assert "note  of the load of 5000 N, 825 N press the shoe on; the links carry the rest" in short
-    assert short[-4].endswith("(2 of 9; all: --details):")
+    assert any(line.endswith("--details):") for line in short)
+    assert "(2 of 8; all: --details):" in " ".join(short)  # the load does not help, and is none of them
 
 
 def test_wrong_options_are_told(tmp_path: Path) -> None:

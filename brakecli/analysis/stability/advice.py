@@ -3,13 +3,14 @@
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cache
 from itertools import pairwise, takewhile
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from brakecli.analysis.stability.edges import edges
@@ -81,12 +82,21 @@ class Sensitivity:
         return None if self.growth_derivative is None else 0.01 * abs(at) * self.growth_derivative
 
 
-class Left(NamedTuple):
+@dataclass(frozen=True)
+class Left:
     """The probability that brakes squeal which are built to a drawing, but not quite, with its 95 % interval."""
 
     squeal_probability: float
     squeal_lower: float
     squeal_upper: float
+    unstable_elsewhere: float | None = None  # the part that is unstable, but does not squeal; None if unknown
+    squeal_frequency: float | None = None  # Hz, median of those that vibrate; None where none does
+    unstable: NDArray[np.bool_] | None = field(default=None, compare=False)  # which of them are: sets, samples
+
+    @property
+    def is_vague(self) -> bool:
+        """Whether the interval reaches farther than a tenth of the value: its second digit says nothing then."""
+        return self.squeal_upper - self.squeal_lower > 0.2 * self.squeal_probability
 
 
 @dataclass(frozen=True)
@@ -284,6 +294,11 @@ def rounded(value: float, up: bool, digits: int = _FEWEST_DIGITS) -> str:
     """A number in so many digits, rounded up or down."""
     unit = 10.0 ** (math.floor(math.log10(abs(value))) + 1 - digits) if value else 1.0
     return f"{unit * (math.ceil if up else math.floor)(value / unit):.{digits}g}"
+
+
+def percent(share: float) -> str:
+    """A share in two digits."""
+    return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
 def _is_angle(parameter: str) -> bool:

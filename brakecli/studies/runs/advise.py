@@ -11,7 +11,7 @@ from brakecli.analysis.branches.thresholds import Thresholds, thresholds
 from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.regime.verdict import Verdict
 from brakecli.analysis.stability import advice as of_case
-from brakecli.analysis.stability.advice import Change, Left, Sensitivity
+from brakecli.analysis.stability.advice import Change, Left, Sensitivity, percent
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.report import LARGEST_FRICTION, StabilityReport, stability
 from brakecli.case.case import Case
@@ -33,6 +33,8 @@ _DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
 _ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
+SMALLEST = "smallest change first (by ratio; angles in radians)"
+"""In which order changes stand."""
 _PRESSED_PART = 0.5  # of the load: where less presses the shoe on, the links carry more of it than the pad
 
 
@@ -63,7 +65,12 @@ class AdviceReport:
     left_out: str = ""  # what was not asked, as it takes too long
     squeal: Left | None = None  # of the case itself, under scatter
     scatter: str = ""  # which one, in words
-    ranking: str = "Confirmed by a run, smallest relative change first"
+    ranking: str = f"Confirmed by a run, {SMALLEST}"
+    band: tuple[float, ...] | None = None  # Hz, between which squeal counts under scatter; any where None
+    elsewhere: str = ""  # what is said of brakes that are unstable, but do not squeal there
+    helpful: Sequence[str] = ()  # keys whose change surely lowers what is unstable under scatter
+    mildest: str | None = None  # of these the one that leaves least of it
+    in_vain: str = ""  # what no change does to how many are unstable under scatter; empty where one does
 
     @property
     def margin(self) -> float | None:
@@ -86,9 +93,10 @@ class AdviceReport:
         """Names and values as `--json` gives them."""
         return values_of(fields.ADVICE, self)
 
-    def conclusion(self) -> str:
-        """The answer in a sentence."""
-        return "; ".join((*self._state(), *self._remedy()))
+    @property
+    def conclusion(self) -> "Words":
+        """The answer in a sentence; `conclusion()` gives it, too."""
+        return Words("; ".join((*self._state(), *self._remedy())))
 
     def notes(self) -> list[str]:
         """What the answer rests on."""
@@ -124,7 +132,7 @@ class AdviceReport:
             first = report.modes[0]
             yield f"squeals at {first.frequency:.4g} Hz" if first.frequency else "locks, without vibration"
         elif critical:
-            yield "does not squeal by itself"
+            yield "as drawn it does not squeal by itself"
         if critical == 0.0:
             yield "unstable at any friction, however small"
         elif critical is not None and report.critical is not None:
@@ -139,11 +147,24 @@ class AdviceReport:
             if self.thresholds.beside:
                 yield self.thresholds.beside
             if self.squeal:
-                percent = 100.0 * self.squeal.squeal_probability
-                yield f"under a scatter {self.scatter} {percent:.2g} % of such brakes squeal"
+                yield self._scattered(self.squeal)
         elif report.equilibrium is not None and report.contact_stiffness > 0.0:
             searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
             yield f"stable: no friction makes it unstable{searched}"
+
+    def _scattered(self, left: Left) -> str:
+        """How many brakes squeal that are built to the drawing."""
+        but = "but " if self.stability.stable and left.squeal_lower > 0.0 else ""
+        those = "brakes built to this drawing" if self.stability.stable else "such brakes"
+        return f"{but}under a scatter {self.scatter} {self._part(left, f' of {those}')}"
+
+    def _part(self, left: Left, those: str = "") -> str:
+        """Which part squeals, in the band if there is one, and what is unstable beside it."""
+        there = f"between {self.band[0]:g} and {self.band[1]:g} Hz" if self.band and those else "in that band"
+        said = f"{part_of(left)}{those} squeal" + f" {there}" * (self.band is not None)
+        beside = left.unstable_elsewhere or 0.0
+        shown = self.band is not None or beside > 0.0
+        return f"{said}, and {percent(beside)} {self.elsewhere}" if self.elsewhere and shown else said
 
     def _remedy(self) -> Iterator[str]:
         if not self.advice:
@@ -156,14 +177,37 @@ class AdviceReport:
         effect = "takes the instability away"
         if critical is not None:
             effect = f"moves the loss of stability to {critical:.3g}"
-        squealing = "" if best.squeal is None else f", and {100.0 * best.squeal.squeal_probability:.2g} % squeal"
+        squealing = "" if best.squeal is None else f", and {self._part(best.squeal)}"
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}{squealing}"
+        mildest = next((change for change in self.advice if change.parameter == self.mildest), best)
+        if mildest.parameter != best.parameter and mildest.squeal:
+            yield f"{mildest.parameter} → {mildest.rounded} leaves least: {self._part(mildest.squeal)}"
+        if self.in_vain:
+            yield f"no change listed {self.in_vain} how many are unstable: try a larger --margin, or damping"
         if best.check is None:
             yield "no run has checked that"
         elif best.check == Regime.UNDECIDED:
             yield "but a run from the case's own start is undecided"
         elif best.check != Regime.DAMPED:
             yield f"but from the case's own start it still vibrates: {best.check}"
+
+
+class Words(str):
+    """A sentence that may be called as well: it gives itself."""
+
+    def __call__(self) -> str:
+        """The sentence."""
+        return str(self)
+
+
+def part_of(left: Left) -> str:
+    """The share that squeals, with its 95 % interval where that leaves no second digit sure."""
+    upper = percent(left.squeal_upper)
+    if not left.is_vague:
+        return percent(left.squeal_probability)
+    if left.squeal_probability == 0.0:
+        return f"at most {upper}"
+    return f"{percent(left.squeal_probability)} (95 %: {percent(left.squeal_lower)[:-2]} to {upper})"
 
 
 def _far(margin: float | None, own: float) -> str:

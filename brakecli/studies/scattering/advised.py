@@ -12,20 +12,21 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from brakecli.analysis.probability import Probability
+from brakecli.analysis.probability import Probability, surely_fewer
 from brakecli.analysis.stability.advice import Change, Left, changed, numbers
 from brakecli.analysis.stability.modes import first_order, is_undamped, stiffness_matrix
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
+from brakecli.solver.arrays import Floats
 from brakecli.solver.integrate import Counted
 from brakecli.solver.links import coefficients
 from brakecli.solver.steady_sliding import sliding
-from brakecli.studies.runs.advise import AdviceReport
+from brakecli.studies.runs.advise import SMALLEST, AdviceReport
 from brakecli.studies.scattering.draw import sample_values
 from brakecli.studies.scattering.eigen import ask, asking
-from brakecli.studies.scattering.scatter import squeals
+from brakecli.studies.scattering.scatter import ELSEWHERE, elsewhere, squeals
 from brakecli.studies.scattering.study import LoadedStudy, Parameter, Study
 from brakecli.studies.sweeps.plan import LoadedSweep, sweep_of
 from brakecli.studies.sweeps.point_list import GIVEN, Listed
@@ -57,17 +58,69 @@ def under_tolerance(report: AdviceReport, case: Case) -> AdviceReport:
 
     words = f"of ±{TOLERANCE:g} % in stiffness and friction"
     advice = [replace(change, squeal=squeal_of(change)) for change in report.advice]
-    return replace(report, advice=advice, squeal=_squeal(case), scatter=words)
+    return judged(replace(report, advice=advice, squeal=_squeal(case), scatter=words))
+
+
+def judged(report: AdviceReport) -> AdviceReport:
+    """The advice with what of it surely lowers the share that is unstable, and what leaves least of it.
+
+    The same samples are compared. Of changes that cannot be told apart so the first is taken. Where none of them
+    lowers it, or none to a half (a choice), that is said.
+    """
+    helpful = [change.parameter for change in report.advice if _is_better(change.squeal, report.squeal)]
+    there = [change for change in report.advice if change.parameter in helpful]
+    mildest = next((change.parameter for change in _tied(there)), None)
+    drawn = None if report.squeal is None else report.squeal.unstable
+    vain = ""
+    if drawn is not None and Probability.of(drawn).lower > 0.0 and any(change.squeal for change in report.advice):
+        halved = any(_share(change.squeal) <= 0.5 * drawn.mean() for change in there)
+        vain = "surely lowers" if not helpful else "" if halved else "halves"
+    return replace(report, helpful=helpful, mildest=mildest, in_vain=vain)
+
+
+def _is_better(left: Left | None, other: Left | None) -> bool:
+    """Whether fewer of the same brakes are surely unstable."""
+    if left is None or other is None or left.unstable is None or other.unstable is None:
+        return False
+    return surely_fewer(left.unstable, other.unstable)
+
+
+def _tied(changes: list[Change]) -> list[Change]:
+    """The changes in order: first all that cannot be told from what leaves least, in the order they had."""
+    if not changes:
+        return []
+    least = min(changes, key=lambda change: _share(change.squeal))
+    ties = [change for change in changes if change is least or not _is_better(least.squeal, change.squeal)]
+    names = {change.parameter for change in ties}
+    return ties + _tied([change for change in changes if change.parameter not in names])
+
+
+def _share(left: Left | None) -> float:
+    """The part of the brakes that is unstable."""
+    return np.inf if left is None or left.unstable is None else float(left.unstable.mean())
 
 
 def _squeal(case: Case) -> Left | None:
     """The part of such brakes that squeal; None where that is not known."""
-    hits = squealing(case)
-    return None if hits is None else Left(*Probability.of(hits))
+    frequencies = _frequencies(case)
+    if frequencies is None:
+        return None
+    hits = frequencies > 0.0
+    return Left(*Probability.of(hits), squeal_frequency=_median(frequencies[hits]), unstable=hits)
+
+
+def _median(values: Floats) -> float | None:
+    return float(np.median(values)) if values.size else None
 
 
 def squealing(case: Case) -> NDArray[np.bool_] | None:
     """Which of the brakes about a drawing have a mode that grows and swings: sets, samples. None if not known."""
+    frequencies = _frequencies(case)
+    return None if frequencies is None else frequencies > 0.0
+
+
+def _frequencies(case: Case) -> Floats | None:
+    """Frequency (Hz) of the mode that grows fastest and swings, of the brakes about a drawing; 0 without one."""
     system = system_of(case)
     equilibrium = sliding(system)
     if equilibrium is None or not equilibrium.is_pressed(system.load_at_start) or is_undamped(system.coefficients):
@@ -94,7 +147,10 @@ def squealing(case: Case) -> NDArray[np.bool_] | None:
     k = equilibrium.stiffness * layer / case.contact.stiffness
     motion = first_order(c, stiffness_matrix(c, k, np.copysign(phi, system.belt_speed)) / case.shoe.mass)
     roots = np.linalg.eigvals(motion)
-    return np.asarray(((roots.real > 0.0) & (roots.imag > 0.0)).any(axis=-1))
+    growth = np.where((roots.real > 0.0) & (roots.imag > 0.0), roots.real, 0.0)
+    first = growth.argmax(axis=-1)[..., None]
+    found = np.where(growth > 0.0, roots.imag, 0.0) / (2.0 * np.pi)
+    return np.asarray(np.take_along_axis(found, first, axis=-1)[..., 0])
 
 
 def about(case: Case) -> Study:
@@ -112,12 +168,14 @@ def under_scatter(
     engine_of: Callable[..., Engine],
     progress: Counted,
 ) -> AdviceReport:
-    """The advice with the probability of squeal that each leaves, by eigenvalues, the least first.
+    """The advice with the probability of squeal that each leaves, by eigenvalues.
 
-    Squeal counts at any frequency: advice that moves it out of the band of the study does not help. A key that
-    scatters itself is shifted with its distribution. What leaves samples without a case has none.
+    Squeal counts in the band of the study. The order is by what is unstable in or out of it: advice that moves
+    squeal out of the band does not help. First comes what surely lowers that, the least first; what the same
+    samples do not tell apart stays in its order. A key that scatters itself is shifted with its distribution.
+    What leaves samples without a case has none.
     """
-    study = loaded.study.model_copy(update={"method": "eigenvalue", "band": None})
+    study = loaded.study.model_copy(update={"method": "eigenvalue"})
     values = sample_values(study)
 
     def squeal_of(change: Change | None) -> Left | None:
@@ -127,15 +185,26 @@ def under_scatter(
             return None
         with engine_of(sweep.plan, compute=asking(sweep.plan, study.band)) as engine:
             answers = ask(engine, sweep.plan.points, progress)
-        hits = squeals(study, {name: answers[name] for name in answers.dtype.names or ()})
-        return Left(*Probability.of(hits.reshape(values.shape[:2])))
+        columns = {name: answers[name] for name in answers.dtype.names or ()}
+        hits = squeals(study, columns)
+        beside = elsewhere(study, columns)
+        unstable = (hits | beside).reshape(values.shape[:2])
+        frequencies = columns["frequency"][(hits | beside) & (columns["frequency"] > 0.0)]
+        share = Probability.of(hits.reshape(values.shape[:2]))
+        return Left(*share, float(beside.mean()), _median(frequencies), unstable)
 
     advice = [
         replace(change, squeal=squeal_of(change) if change.to is not None else None) for change in report.advice
     ]
-    advice.sort(key=lambda change: np.inf if change.squeal is None else change.squeal.squeal_probability)
-    ranking = "What leaves least squeal under the study's scatter first"
-    return replace(report, advice=advice, squeal=squeal_of(None), scatter="as of the study", ranking=ranking)
+    with_squeal = judged(replace(report, advice=advice, squeal=squeal_of(None), scatter="as of the study"))
+    helpful = _tied([change for change in advice if change.parameter in with_squeal.helpful])
+    return replace(
+        with_squeal,
+        advice=helpful + [change for change in advice if change.parameter not in with_squeal.helpful],
+        ranking=f"Least instability under the study's scatter first; of what it does not tell apart, {SMALLEST}",
+        band=study.band,
+        elsewhere=ELSEWHERE[study.band is not None],
+    )
 
 
 def _changed(columns: dict[str, list[float]], change: Change | None, base: LoadedCase) -> LoadedSweep:

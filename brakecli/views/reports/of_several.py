@@ -106,7 +106,7 @@ def best_of(designs: Mapping[str, AdviceReport]) -> str:
     seldom = [*designs]
     left = {name: each.squeal for name, each in designs.items() if each.squeal}
     if len(left) == len(designs):
-        least = min(left.values())
+        least = min(left.values(), key=lambda each: each.squeal_probability)
         seldom = [name for name, each in left.items() if each.squeal_lower <= least.squeal_upper]
         shares = listed([f"{100.0 * each.squeal_probability:.2g} % of {name}" for name, each in left.items()])
         by.append(f"under a scatter {next(iter(designs.values())).scatter} {shares} squeal")

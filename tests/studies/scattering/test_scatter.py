@@ -353,14 +353,25 @@ def test_a_study_is_drawn_reported_and_written_as_a_starter(tmp_path: Path) -> N
 @campaign
 def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path: Path) -> None:
     """Of the key that scatters, its mean is moved; of another, the case has the new value."""
-    path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
+    write_study(tmp_path, FRICTION, ANGLE, "samples = 64", "band = [1.0, 100.0]")
     keys = "link2.angle_deg,link1.stiffness"
+    line = ["advise", "shoe.toml", "--scatter", "study.toml", "--keys", keys, "--json"]
+    outside = json.loads(command(*line, cwd=tmp_path).out)
+    path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
     said = command("advise", "shoe.toml", "--scatter", "study.toml", "--keys", keys, "--json", cwd=tmp_path).out
     told = json.loads(said)
     own = brakecli.scatter(path).probability.sel(outcome="squeal")
     assert told["squeal_probability"] == float(own) > 0.0
+    assert outside["squeal_probability"] == 0.0  # as `scatter` says
+    assert outside["unstable_elsewhere"] == float(own)
+    assert "squeal between 1 and 100 Hz, and " in outside["conclusion"]
+    assert "% are unstable outside that band" in outside["conclusion"]
+    # what moves squeal out of the band does not help: the order is that without a band
+    assert [each["parameter"] for each in outside["advice"]] == [each["parameter"] for each in told["advice"]]
     left = [each["squeal_probability"] for each in told["advice"]]
-    assert left == sorted(left)
+    assert [each["unstable_elsewhere"] for each in outside["advice"]] == left
+    assert left == [2.0 / 64.0, 0.0]  # two samples are not surely more than none: the smaller change is first
+    assert [each["parameter"] for each in told["advice"]] == ["link2.angle_deg", "link1.stiffness"]
     assert max(left) < float(own)
     assert told["check"]["parameter"] == told["advice"][0]["parameter"]
     for each in told["advice"]:
@@ -373,7 +384,7 @@ def test_advice_under_scatter_is_that_of_a_study_of_the_changed_drawing(tmp_path
         path = write_study(tmp_path, FRICTION, ANGLE, "samples = 64")
     shown = command("advise", "shoe.toml", "--scatter", "study.toml", cwd=tmp_path).out
     assert "under a scatter as of the study" in " ".join(shown.split())
-    assert "What leaves least squeal under the study's scatter first" in " ".join(shown.split())
+    assert "Least instability under the study's scatter first" in " ".join(shown.split())
 
 
 @campaign

@@ -213,7 +213,7 @@ def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_n
     [
         (
             "friction.coefficient=0.3",
-            "Nothing has to be changed; does not squeal by itself; sliding loses",
+            "Nothing has to be changed; as drawn it does not squeal by itself; sliding loses",
         ),
         ("wheel.angular_speed=0.0", "No change is known; the wheel stands"),
     ],
