@@ -103,6 +103,47 @@ def test_frequency_and_amplitude_of_a_sine_are_those_of_its_displacement() -> No
     assert look(Signal(stiffness * x, 1e-3), quantity=Measurand.FORCE).verdict.amplitude is None
 
 
+@pytest.mark.parametrize("noise", [0.0, 0.3, 1.0, 3.0])
+@pytest.mark.parametrize("frequency", [900.0, 900.13])
+def test_the_amplitude_of_an_acceleration_is_that_of_its_tone_and_not_of_integrated_noise(
+    noise: float, frequency: float
+) -> None:
+    turn = 2.0 * np.pi * frequency
+    time = np.arange(60_000) / 20_000.0
+    values = 20.0 * np.sin(turn * time) + noise * np.random.default_rng(5).normal(size=len(time))
+    found = look(Signal(values, 1.0 / 20_000.0), quantity=Measurand.ACCELERATION).verdict
+    true = 20.0 / turn**2
+    assert found.amplitude is not None
+    assert found.amplitude_spread is not None
+    # of a known frequency the amplitude has a standard deviation of σ √(2/n); here it is that of a window
+    assert found.amplitude_spread < 1e-4 * true + 10.0 * noise * np.sqrt(2.0 / len(time)) / turn**2
+    assert abs(found.amplitude - true) <= 1e-3 * true + 3.0 * found.amplitude_spread
+
+
+@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.ACCELERATION])
+@pytest.mark.parametrize("slip", [0.1, 0.3])
+def test_the_amplitude_of_stick_slip_among_noise_is_that_of_its_displacement(
+    quantity: Measurand, slip: float
+) -> None:
+    x = stick_slip(100, 60, slip)
+    found = look(Signal(measured(x, 100, quantity, 20), 0.01), quantity=quantity).verdict
+    assert found.amplitude is not None
+    assert found.amplitude_spread is not None
+    true = 0.5 * float(np.ptp(x))
+    # overtones that noise hides bring the corners closer: the k-th has 2/πk of a saw-tooth
+    assert found.amplitude == pytest.approx(true, rel=0.03)
+
+
+@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.ACCELERATION])
+def test_what_has_died_out_has_no_amplitude(quantity: Measurand) -> None:
+    time = np.arange(60_000) / 20_000.0
+    values = 2e-5 * np.exp(-8.0 * time) * np.sin(1800.0 * np.pi * time)
+    values = values + 2e-8 * np.random.default_rng(5).normal(size=len(time))
+    found = look(Signal(values, 1.0 / 20_000.0), quantity=quantity).verdict
+    assert found.regime == Regime.DAMPED
+    assert (found.amplitude, found.amplitude_spread) == (None, None)
+
+
 def test_events_and_time_of_stick_are_counted() -> None:
     for slip in (0.05, 0.1, 0.3):
         found = verdict(

@@ -19,7 +19,7 @@ _NOISE_SHARE = 0.6  # most of the variance that noise may be where slips are sou
 _SLOWEST = 60  # parts of the record over which is smoothed at most
 _MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
 _QUIET = 0.02  # and where all else is looked at
-_DRIFT_CYCLES = 8.0  # over which drift is averaged
+DRIFT_CYCLES = 8.0  # over which drift is averaged
 _COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
 _SHORTEST = 8  # samples in which noise can be told
 _SIDE = 24  # samples before and behind, the louder of which a spike has to leave; a choice
@@ -83,12 +83,6 @@ class Velocity:
         parts = [(share, m) for m, share in self.scales]
         return next((m for share, m in parts if share <= _QUIET), min(parts, default=(1.0, 1))[1])
 
-    def amplitude(self, m: int, start: int, windows: int) -> float:
-        """Half of peak to peak of the displacement, smoothed over m samples: median of windows."""
-        c = self._primitive
-        x = c if self.measured else (c[m:] - c[:-m]) / m
-        return 0.5 * float(np.median([np.ptp(window) for window in np.array_split(x[start:], windows)]))
-
     def levels(self, m: int, start: int, windows: int) -> Array:
         """Standard deviations in windows from a sample on, smoothed over m samples, without the noise."""
         parts = np.array_split(self.smoothed(m)[start:], windows)
@@ -123,14 +117,14 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     if order < 2 or not velocity.scales:  # the sum of noise would not look like noise
         return velocity, notes
     values = np.cumsum(velocity.values)
-    width = int(_DRIFT_CYCLES * _cycle(velocity))
+    width = int(DRIFT_CYCLES * _cycle(velocity))
     slow = uniform_filter1d(values, width) if 2 * width <= len(values) else 0.0
     return replace(_velocity(values - slow, True), first=first), notes
 
 
 def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocity:
     """The velocity without what is slower than some cycles, which have at least so many samples."""
-    width = int(_DRIFT_CYCLES * max(cycle, _cycle(velocity))) if len(velocity.values) >= _SHORTEST else 0
+    width = int(DRIFT_CYCLES * max(cycle, _cycle(velocity))) if len(velocity.values) >= _SHORTEST else 0
     if not 0 < 2 * width <= len(velocity.values):
         return velocity
     drift = uniform_filter1d(velocity.values, width)

@@ -64,7 +64,7 @@ class SignalVerdict:
     regime: Regime
     reasons: tuple[str, ...]
     frequency: float | None  # Hz: strongest line, or events of stick per second
-    amplitude: float | None  # m, half of peak to peak of x
+    amplitude: float | None  # m, half of peak to peak of x at the tones found; of what has died out none
     stick_fraction: float | None
     bursts: tuple[Burst, ...]  # when a tone stands out
     evidence: dict[str, Any]  # row that decided, and the answers that are known
@@ -75,6 +75,7 @@ class SignalVerdict:
     ringing_frequency_error: float | None = None  # Hz, a standard error
     damping_ratio: float | None = None
     damping_ratio_error: float | None = None
+    amplitude_spread: float | None = None  # m, by which it varies, and noise moves it
     excitation: Excitation = Excitation.NONE  # a measurement does not show where the energy comes from,
     contact_loss_fraction: None = None  # nor whether contact was lost
 
@@ -137,7 +138,8 @@ def _of_bursts(signal: Signal, settings: _Settings, whole: SignalVerdict) -> Sig
             return replace(inside, reasons=said, frequency=line, bursts=tones, warnings=whole.warnings)
     if whole.regime is Regime.DAMPED:
         return whole
-    return replace(whole, reasons=(f"{when}: {whole.reasons[0]}",))
+    reasons = (f"{when}: {whole.reasons[0]}",)
+    return replace(whole, reasons=reasons, amplitude=None, amplitude_spread=None)  # the record has pauses, too
 
 
 def _judge(
@@ -172,7 +174,11 @@ def _judge(
         if slipping or record.knows_belt:
             stick = slips.stick if slipping else record.sticks if decision.regime is Regime.RELAXATION else 0.0
     begin = record.steady_from if decision.regime in _SUSTAINED else 0.0
-    amplitude = heard.amplitude(begin) * size * step**order / spring if record.heard else math.nan
+    measured = raw if order < 2 else cleaned(signal.values / size, 1)[0]  # with its drift, and white noise
+    amplitude = spread = math.nan
+    if record.heard and decision.regime is not Regime.DAMPED:  # what has died out has none that lasts
+        sizes = heard.amplitude(measured, order, begin)
+        amplitude, spread = (value * size * step**order / spring for value in sizes)
     numbers = {
         name: value for name, value in asdict(record).items() if type(value) is float and math.isfinite(value)
     }
@@ -182,6 +188,7 @@ def _judge(
         reasons=(decision.sentence,),
         frequency=per_second,
         amplitude=amplitude if math.isfinite(amplitude) and not signal.relative else None,
+        amplitude_spread=spread if math.isfinite(spread) and not signal.relative else None,
         stick_fraction=stick,
         bursts=(),
         evidence={"row": decision.row, **numbers, "noise": noise},
@@ -189,10 +196,8 @@ def _judge(
         thresholds=thresholds,
         unit=FULL_SCALE if signal.relative else MEASURED_UNITS[quantity],
     )
-    if decision.regime is Regime.DAMPED:
-        raw = raw if order < 2 else cleaned(signal.values / size, 1)[0]  # with its drift: no sum bends the decay
-        if rings := _ringing(raw, step, heard.line, thresholds):
-            verdict = replace(verdict, **asdict(rings))
+    if decision.regime is Regime.DAMPED and (rings := _ringing(measured, step, heard.line, thresholds)):
+        verdict = replace(verdict, **asdict(rings))
     return SignalLook(verdict, signal, quantity, velocity, slips, heard.smoothing)
 
 

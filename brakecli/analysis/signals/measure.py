@@ -9,7 +9,7 @@ import numpy as np
 
 from brakecli.analysis.regime.evidence import WINDOWS, level_change
 from brakecli.analysis.regime.spectra import line_share
-from brakecli.analysis.signals.cleaning import CERTAIN, Velocity
+from brakecli.analysis.signals.cleaning import CERTAIN, DRIFT_CYCLES, Velocity
 from brakecli.analysis.signals.slips import Slips
 from brakecli.analysis.signals.table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
 from brakecli.analysis.spectrum import Array, interpolated
@@ -19,6 +19,7 @@ _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
 _SHORTEST_PLATEAU = 0.03  # of the time
 _WIDTHS: tuple[float, ...] = 0.02, 0.01, 0.005  # half widths of a plateau that are tried, over the amplitude
 _NEXT = 3.0  # times that width: what lies within is next to a plateau
+_OF_A_PEAK = 32.0  # samples of a cycle, interpolated: the largest is 1/2 % below the peak at most, (π/32)²/2
 _BIN = 0.01  # of the amplitude, in which the most frequent velocities are counted
 _TAIL = 0.01  # of the time, in which the velocity may go beyond its range
 # least and largest velocity, over the belt's, that reaches the belt's just so
@@ -55,9 +56,39 @@ class Heard:
         """How many windows hold three cycles or more each."""
         return int(np.clip(self.cycles / _WINDOW_CYCLES, 1, WINDOWS))
 
-    def amplitude(self, begin: float) -> float:
-        """Half of peak to peak of the displacement, from some part of the record on."""
-        return self.velocity.amplitude(self.smoothing, int(begin * self.samples), self.windows)
+    def amplitude(self, measured: Velocity, order: int, begin: float) -> tuple[float, float]:
+        """Half of peak to peak of the displacement at its tones, from some part of the record on, and its spread.
+
+        `measured` is what the sensor gave, or the differences of a displacement: there the noise is white. Its sum
+        is not, so lines are sought before they are integrated, each over its own frequency. Under a Hann window a
+        line does not reach those far away, which integration would enlarge; the window is divided out where it is
+        1/2 or more, in the middle half. Median of windows there, and half of the range of their middle two thirds
+        with the standard deviation of the noise that the lines hold. nan where no line stands out.
+        """
+        values = measured.values[int(begin * len(measured.values)) :]
+        count = len(values)
+        window = np.hanning(count)
+        spectrum = np.fft.rfft((values - values.mean()) * window)
+        turn = np.linspace(0.0, 2.0 * np.pi * (len(spectrum) - 1) / count, len(spectrum))
+        difference = np.exp(1j * turn) - 1.0
+        gain = (1j * turn) ** order if order else difference  # from the displacement to what is given
+        noise = np.mean(window**2) * count * measured.noise**2 * np.abs(1.0 if order else difference) ** 2
+        often = self.cycles / self.samples
+        tones = (np.abs(spectrum) ** 2 > CERTAIN * noise) & (turn > 2.0 * np.pi * often / DRIFT_CYCLES)
+        if not tones.any():
+            return math.nan, math.nan
+        held = np.zeros(len(spectrum))
+        held[tones] = (noise * np.ones(len(spectrum)))[tones] / np.abs(gain[tones]) ** 2
+        x = np.zeros(len(spectrum), np.complex128)
+        x[tones] = spectrum[tones] / gain[tones]
+        finer = int(np.ceil(_OF_A_PEAK * often)) if count <= _PLATEAU_SAMPLES else 1
+        moved = finer * np.fft.irfft(x, finer * count)
+        middle = slice(len(moved) // 4, 3 * len(moved) // 4)
+        moved = moved[middle] / np.interp(np.arange(len(moved))[middle] / finer, np.arange(count), window)
+        windows = int(np.clip(0.5 * often * count / _WINDOW_CYCLES, 1, WINDOWS))
+        sizes = [0.5 * float(np.ptp(part)) for part in np.array_split(moved, windows)]
+        low, size, high = map(float, np.quantile(sizes, [1.0 / 6.0, 0.5, 5.0 / 6.0]))
+        return size, math.hypot(0.5 * (high - low), math.sqrt(2.0 * float(held.sum())) / count)
 
     @cached_property
     def lines(self) -> Array:
