@@ -10,6 +10,7 @@ that of the mode at this friction.
 
 import math
 import re
+from collections.abc import Sequence
 from decimal import Decimal
 from functools import partial
 from typing import NamedTuple
@@ -103,6 +104,7 @@ class Similar(NamedTuple):
     friction: float | None = None  # of the brake, where it is not that of the starter
     critical: float | None = None  # critical friction of both, which is known where that is given
     stable: bool | None = None  # sliding of the brake, likewise
+    not_given: tuple[str, ...] = ()  # numbers with their units that are those of the starter, scaled
 
     @property
     def sentence(self) -> str:
@@ -117,12 +119,22 @@ class Similar(NamedTuple):
             far = f"is {times:.3g} times" if times > 2.0 else f"lies {100.0 * abs(times - 1.0):.2g} % {side}"
             own = f"the brake's own {self.friction:g} {far} that"
             same = f"{same}, {self.critical:.3g}; {own}: sliding is {'stable' if self.stable else 'unstable'}"
+        if self.not_given:  # U m ω/Q needs all four
+            names, sizes = zip(*(each.split(": ") for each in self.not_given), strict=True)
+            many = "were not given: {} are those" if len(names) > 1 else "was not given: {} is that"
+            said = many.format(_listed(sizes))
+            missing = f"{_listed(names)} {said} of the starter, scaled, so that how it vibrates is not said"
+            return f"{missing}; {same}"
         number = f"U m ω/Q is {self.number:.3g} (there {self.before:.3g})"
         regime = "quasi-harmonic: it leaves the wheel and does not stick"
         if self.sticks:
             regime = "relaxation: it sticks in every cycle"
         follows = f", so that it vibrates, {regime}" if self.sticks is not None else "; a run tells what follows"
         return f"{same}; {number}{follows}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def similar(starter: str, text: str, brake: Brake) -> Similar:
@@ -148,9 +160,19 @@ def similar(starter: str, text: str, brake: Brake) -> Similar:
     factors = Scales(mass, time, length, speed * time, 1.0 if system.smooth else speed * time)
     wanted = _Whole(own.mass * mass, own.frequency / time, own.load * load, own.speed * speed)
     number = _number(wanted)
-    case = Similar(_scaled(text, factors, _head(wanted, starter, brake.friction)), number, before)
+    units = {"mass": "kg", "frequency": "Hz", "load": "N", "speed": "m/s"}
+    sizes = wanted._asdict()
+    missing = tuple(
+        f"{name}: {sizes[name]:.3g} {unit}" if name != "load" else f"{name}: {sizes[name]:g} {unit}"
+        for name, unit in units.items()
+        if getattr(brake, name) is None
+    )
+    case = Similar(
+        _scaled(text, factors, _head(wanted, starter, brake.friction)), number, before, not_given=missing
+    )
     if brake.friction is None:
-        return case._replace(sticks=number < STICKS_BELOW if starter == "case" else None)
+        whole = starter == "case" and not missing
+        return case._replace(sticks=number < STICKS_BELOW if whole else None)
     critical = critical_friction(system, _stiffness(system))
     return case._replace(friction=brake.friction, critical=critical, stable=_values(system).real.max() <= 0.0)
 

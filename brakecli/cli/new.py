@@ -1,5 +1,6 @@
 """`brakecli new`."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -68,6 +69,7 @@ def command(options: New, quiet: Quiet = False) -> None:
             raise UsageError(f"{starter} is no case, and the numbers of a brake make one; {remedy}")
         of_brake = similar(starter if starter in texts else "case", text, brake)
         text = of_brake.text
+        warn(*_slips(options, text))
     # a sweep or a study has a base
     written = {path: text}
     if base and not (path.parent / base).exists():
@@ -84,8 +86,24 @@ def command(options: New, quiet: Quiet = False) -> None:
         show(f"{' and '.join(map(str, written))}: written; run it with: {how}")
         if of_brake:
             show(of_brake.sentence)
-    if of_brake:
-        from brakecli.api.commands import slips_in
-        from brakecli.case.read import parse_case
 
-        warn(*slips_in(parse_case(text, str(path))))
+
+def _slips(options: New, text: str) -> Iterator[str]:
+    """Warnings of numbers of a brake that no brake has, by the options that give them.
+
+    Others follow from these, or are those of the starter: nobody has slipped there.
+    """
+    from brakecli.api.commands import slips_in
+    from brakecli.case.read import parse_case
+
+    given = {
+        "shoe.mass": options.mass,
+        "load.force": options.load,
+        "wheel.angular_speed": options.speed,
+        "friction.coefficient": options.friction,
+    }
+    names = dict(zip(given, ("--mass", "--load", "--speed", "--friction"), strict=True))
+    for each in slips_in(parse_case(text, "the new case")):
+        key, _, said = each.partition(": ")
+        if given.get(key) is not None:
+            yield f"{names[key]}: {said}"

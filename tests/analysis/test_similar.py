@@ -152,6 +152,29 @@ def test_what_makes_no_case_is_refused_and_nothing_is_written(
     assert not [*tmp_path.iterdir()]
 
 
+@pytest.mark.parametrize(
+    ("brake", "said"),
+    [
+        (
+            Brake(0.6, 2600.0),
+            "load and speed were not given: 5000 N and 0.0558 m/s are those of the starter, scaled",
+        ),
+        (Brake(0.6, 2600.0, 300.0), "speed was not given: 0.00335 m/s is that of the starter, scaled"),
+        (
+            Brake(frequency=2600.0, load=300.0, speed=2.0),
+            "mass was not given: 10 kg is that of the starter, scaled",
+        ),
+    ],
+)
+def test_no_regime_follows_from_what_was_not_given(brake: Brake, said: str) -> None:
+    found = similar("case", STARTERS["case"], brake)
+    assert found.sentence.startswith(f"{said}, so that how it vibrates is not said; ")
+    assert found.sticks is None
+    assert not {"relaxation", "quasi-harmonic", "U m ω/Q"} & {
+        word for word in ("relaxation", "quasi-harmonic", "U m ω/Q") if word in found.sentence
+    }
+
+
 def test_new_says_what_is_assumed_and_what_follows(tmp_path: Path) -> None:
     numbers = ["--mass", "0.4", "--frequency", "1900", "--load", "8000", "--speed", "8"]
     shown = brakecli("new", "squeal", *numbers, cwd=tmp_path).out
@@ -165,6 +188,10 @@ def test_new_says_what_is_assumed_and_what_follows(tmp_path: Path) -> None:
         "# A brake of 0.4 kg at 1900 Hz, under 8000 N, at 8 m/s, with friction 0.45: similar to"
     )
     grams = brakecli("new", "squeal", "--mass", "400", "--load", "8", "--force", cwd=tmp_path)
-    assert "shoe.mass: 400 kg is more than 300 kg; were grams meant?" in grams.err
+    assert "--mass: 400 kg is more than 300 kg; were grams meant?" in grams.err
+    assert "--load: 8 N is less than 20 N; were kilonewtons meant?" in grams.err
+    scaled = brakecli("new", "squeal", "--mass", "0.5", "--speed", "150", "--load", "5e5", "--force", cwd=tmp_path)
+    assert scaled.err.count("warning") == 1  # what follows from the options is not the user's slip
+    assert "--speed: a surface speed of 150 m/s is more than 100 m/s" in scaled.err
     brakecli("new", "squeal", *numbers, "--force", cwd=tmp_path)
     assert parse_case((tmp_path / "squeal.toml").read_text(), "squeal").case.shoe.mass == 0.4
