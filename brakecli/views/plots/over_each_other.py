@@ -60,19 +60,21 @@ def _runs(results: Sequence[StoredResult], variable: str, names: Sequence[str], 
     title = pictures[0].title if len(titles) == 1 else "Runs beside each other"
     figure, panels = _panels(3, 2.8, title, lines, in_a_row)
     same_end = len({picture.detail["time"][-1] for picture in pictures}) == 1
-    details = [picture.detail[variable] for picture in pictures]
+    times = [picture.detail["time"] for picture in pictures]
+    times = [time - (0.0 if same_end else time[-1]) for time in times]
+    ends = [max(float(time[0]) for time in times), max(float(time[-1]) for time in times)]  # of the shortest part
+    inside = [time >= ends[0] for time in times]
+    details = [picture.detail[variable][shown] for picture, shown in zip(pictures, inside, strict=True)]
     look = scaled(variable, np.concatenate(details), np.concatenate(details))
     envelopes = [_wider(picture) for picture in pictures]
     whole = np.concatenate([end for envelope in envelopes for end in envelope[1:]])
     shown = pictures[0].whole
     whole_look = scaled(shown, whole, whole)
-    times = [picture.detail["time"] for picture in pictures]
-    times = [time - (0.0 if same_end else time[-1]) for time in times]
     highest = max((picture.spectrum[2] for picture in pictures), key=style.largest)
     scale, label = style.density(highest, pictures[0].spectrum[1], VARIABLES[variable][3])
     label = label.removeprefix("power spectral ") if style.is_narrow() or in_a_row else label
     for number, (name, picture, curve) in enumerate(zip(names, pictures, _LOOKS, strict=False)):
-        panels[0].plot(times[number], look(picture.detail[variable]), label=_plain(name), **curve)
+        panels[0].plot(times[number][inside[number]], look(details[number]), label=_plain(name), **curve)
         time, *bounds = envelopes[number]
         lowest, highest = map(whole_look, bounds)
         if number == 0:
@@ -81,7 +83,6 @@ def _runs(results: Sequence[StoredResult], variable: str, names: Sequence[str], 
             panels[1].plot(time, lowest, time, highest, **curve)
         _, frequency, density = picture.spectrum
         panels[2].semilogy(frequency[1:], scale * np.where(density > 0.0, density, np.nan)[1:], **curve)
-    ends = [min(float(time[0]) for time in times), max(float(time[-1]) for time in times)]
     _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
     parts = {picture.part for picture in pictures}
     part = pictures[0].part if len(parts) == 1 else "Last part of each"
