@@ -26,6 +26,8 @@ Numbers = Mapping[str, tuple[Any, str]]
 # of a picture: a third of the bytes, and no difference that could be seen
 _COLOURS = 255
 _DPI = 120
+PER_CENT = "%"
+_PARTS = ("margin", "squeal_probability")  # besides parts of the time
 
 
 @dataclass(frozen=True)
@@ -163,5 +165,15 @@ def key_unit(key: str) -> str:
 
 
 def numbers_of(known: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
-    """The values of some fields, None where there is none."""
-    return {each.title: (values.get(each.name), each.units) for each in known}
+    """The values of some fields, None where there is none; parts are in per cent, as in sentences."""
+    return {each.title: _number(each, values.get(each.name)) for each in known}
+
+
+def share(part: float | None) -> tuple[float | None, str]:
+    """A part of a whole in per cent, with that as its unit."""
+    return None if part is None else 100.0 * part, PER_CENT
+
+
+def _number(each: Field, value: Any) -> tuple[Any, str]:
+    is_part = each.is_part_of_time or each.name in _PARTS
+    return share(value) if is_part else (value, each.units)

@@ -12,13 +12,25 @@ from brakecli.results.read import StoredResult
 from brakecli.studies.runs.advise import AdviceReport
 from brakecli.studies.scattering.answers import listed
 from brakecli.views.plots import over_each_other
-from brakecli.views.reports.blocks import Beside, Part, Table, Texts, key_unit, percent, picture, rounded, shown
+from brakecli.views.reports.blocks import (
+    PER_CENT,
+    Beside,
+    Part,
+    Table,
+    Texts,
+    key_unit,
+    percent,
+    picture,
+    rounded,
+    shown,
+)
 from brakecli.views.view import sentence
 
 PICTURE = "All results in one picture: the first one wide, the second one dashed"
 THIRD = ", the third one dotted"
 # to which numbers are compared; increase above which there is no per cent
 DIGITS = 4
+_OF_CHANGE = 3
 MOST_PART = 10.0
 # rows of both tables on a single page, and letters of the keys that are left out
 _MOST_KEYS = 5
@@ -130,18 +142,25 @@ def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:
     found = list[tuple[str, ...]]()
     marked = list[int]()
     for name, first, *others, units in rows:
-        changes = [_change(first, other) for other in others]
+        changes = [_change(first, other, units) for other in others]
         if {*changes} != {_SAME}:
             marked.append(len(found))
         found.append((name, *(shown(each, units) for each in (first, *others)), *changes))
     return Table(found, head, marked=marked)
 
 
-def _change(a: Any, b: Any) -> str:
+def _change(a: Any, b: Any, units: str) -> str:
+    """What became of a number: by how much it changed, in per cent of what it was where that says more or less.
+
+    A number below 0 has no per cent, and a part of a whole has its own: their difference is said, in points.
+    """
     if a == b:
         return _SAME
-    if a and all(isinstance(each, int | float) and not isinstance(each, bool) for each in (a, b)):
-        part = b / a - 1.0
-        if -1.0 <= part < MOST_PART:
-            return percent(part)
+    if all(isinstance(each, int | float) and not isinstance(each, bool) for each in (a, b)):
+        if units == PER_CENT or min(a, b) < 0.0:
+            more = rounded(float(b - a), _OF_CHANGE)
+            sign = "+" if more > 0.0 else ""
+            return sign + shown(more, "points" if units == PER_CENT else units)
+        if a and b / a - 1.0 < MOST_PART:
+            return percent(b / a - 1.0)
     return "differs"

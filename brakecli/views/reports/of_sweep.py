@@ -37,6 +37,7 @@ from brakecli.views.reports.blocks import (
     key_unit,
     numbers_of,
     picture,
+    share,
     shown,
 )
 from brakecli.views.reports.of_run import case_blocks, repeat
@@ -181,7 +182,7 @@ def part_of_other(result: StoredResult) -> Part:
         answer.append(said)
         study = [Section("Study", tables_of_study)]
         shares = {
-            f"probability: {PROBABLE.get(name, name)}": (each, "1") for name, each in held["probability"].items()
+            f"probability: {PROBABLE.get(name, name)}": share(each) for name, each in held["probability"].items()
         }
         compared = {**shares, **compared}
     return _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", blocks_of(view))], compared)

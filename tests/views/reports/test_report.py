@@ -294,7 +294,8 @@ def test_three_results_stand_side_by_side_with_their_changes_against_the_first(
     for squeal, friction in zip(told["squeal under a scatter"][1], (0.6, 0.3, 0.75), strict=False):
         hits = squealing(parse_case(TINY, "case", [f"friction.coefficient={friction}"]).case)
         assert hits is not None
-        assert float(squeal) == pytest.approx(hits.mean(), rel=1e-3)
+        assert squeal.endswith("\u00a0%")
+        assert float(squeal.rstrip("\u00a0%")) == pytest.approx(100.0 * hits.mean(), rel=1e-3)
     assert all(len({*cells[:3]}) > 1 for name, (_, cells) in told.items() if name)  # what is the same is no news
     long = reported(*(tmp_path / f"{name}.h5" for name in "abc"))
     assert len(long.named("article")) == 4
@@ -332,6 +333,22 @@ def test_the_better_design_is_named_by_its_margin_and_by_its_squeal_under_a_scat
     three = {"A": design(often), "B": design(seldom, less), "C": design(seldom, less)}
     assert best_of(three).startswith("B and C are best against squeal: ")
     assert best_of({"A": design(often), "B": design(None, "wheel.angular_speed=0.0")}) == ""
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "unit", "said"),
+    [
+        (-4.1, -11.5, "%", "−7.4\u00a0points"),  # a margin that is less than before
+        (19.79, 30.08, "%", "+10.3\u00a0points"),
+        (-50.0, 20.0, "1/s", "+70\u00a01/s"),
+        (-45.0, -50.0, "deg", "−5\u00a0deg"),
+        (200.0, 300.0, "Hz", "+50\u00a0%"),
+        (0.0, 0.0, "%", "same"),
+        ("damped", "relaxation", "", "differs"),
+    ],
+)
+def test_a_change_is_a_part_of_what_was_or_a_difference(before: Any, after: Any, unit: str, said: str) -> None:
+    assert of_several._change(before, after, unit) == said
 
 
 def test_many_changed_keys_are_named_where_a_single_page_has_no_room_for_them(tmp_path: Path, plain: None) -> None:
