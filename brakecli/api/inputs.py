@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 
 _Loaded = TypeVar("_Loaded")
 COMMANDS = {"sweep": "sweep", "study": "scatter"}
+_OWN = {
+    "sweep": {"axis", "critical", "points"},
+    "study": {"parameter", "samples"},
+}  # keys that tell what was meant
 """What computes a file that is no case."""
 
 
@@ -54,33 +58,44 @@ def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":
     """The sweep of a sweep file."""
     from brakecli.studies.sweeps.plan import parse_sweep
 
-    return _over_a_case(source, overrides, parse_sweep)
+    return _over_a_case(source, overrides, parse_sweep, "sweep")
 
 
 def load_study(source: str, overrides: list[str] | None) -> "LoadedStudy":
     """The study of a study file."""
     from brakecli.studies.scattering.study import parse_study
 
-    return _over_a_case(source, overrides, parse_study, ", or write a study of it with: brakecli new scatter")
+    return _over_a_case(
+        source, overrides, parse_study, "study", ", or write a study of it with: brakecli new scatter"
+    )
 
 
 def _over_a_case(
     source: str,
     overrides: list[str] | None,
     parse: Callable[[str, str, Path, Sequence[str]], _Loaded],
+    wanted: str,
     more: str = "",
 ) -> _Loaded:
-    """What a file holds that names its case; `more` is what else to do where it is a case itself."""
-    from brakecli.studies.sweeps.plan import kind_of
+    """What a file holds that names its case, a sweep or a study as is `wanted`.
+
+    `more` is what else to do where it is a case itself.
+    """
+    from brakecli.studies.sweeps.plan import keys_at_top, kind_of
 
     text, name = _text(source)
     try:
         folder = Path(source).parent if os.path.isfile(source) else Path()  # noqa: PTH113 - pathlib's may raise
         return parse(text, name, folder, overrides or ())
     except CaseError as error:
-        if kind_of(text) == "case":
+        kind = kind_of(text) if keys_at_top(text) != {"case"} else wanted
+        if kind == "case":
             remedy = f"simulate it with: {command('run', source)}{more}"
             raise UsageError(f"{name}: this is a case; {remedy}") from error
+        if kind in COMMANDS and kind != wanted and not keys_at_top(text) & _OWN[wanted]:
+            raise UsageError(
+                f"{name}: this is a {kind}; compute it with: {command(COMMANDS[kind], source)}"
+            ) from error
         raise
 
 

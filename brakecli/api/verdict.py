@@ -45,7 +45,8 @@ def _on_result(source: str, thresholds: list[str] | None) -> dict[str, Any]:
         raise
     except UnreadableResultError as error:
         remedy = f"for a measured signal, state with {argument('quantity')} what was measured"
-        raise UnreadableResultError(f"{error}; {remedy}") from error
+        first, _, rest = str(error).rpartition("; ")
+        raise UnreadableResultError(f"{first or rest}; {remedy}{f'; or {rest}' if first else ''}") from error
 
 
 def changed(thresholds: type[Any], changes: list[str] | None) -> Any:

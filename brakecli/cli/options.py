@@ -2,14 +2,17 @@
 
 import inspect
 from collections.abc import Callable
-from functools import wraps
+from functools import partial, wraps
 from typing import Annotated, Any
 
 import typer
 
 from brakecli.api.options import Description, described
 from brakecli.cli.output import warn
+from brakecli.errors import printable
 from brakecli.solver import compiling
+
+_UNITS = {"HZ": "Hz", "KG": "kg", "N": "N", "M/S": "m/s", "N/M": "N/m", "S": "s", "SECONDS": "s"}  # by metavar
 
 
 def with_options(command: Callable[..., None]) -> Callable[..., None]:
@@ -45,8 +48,18 @@ def _as_in_typer(field: inspect.Parameter, said: Description) -> inspect.Paramet
             show_default=not required,
         )
     kind = said.shell or _plain_type(field.annotation.__origin__)
+    if kind is float and not said.by_place and said.least is None and said.most is None:
+        shown.parser = partial(_number, _UNITS.get(said.metavar or "", ""))
     optional = kind | None if field.default is None else kind
     return field.replace(kind=field.KEYWORD_ONLY, annotation=Annotated[optional, shown])
+
+
+def _number(unit: str, text: str) -> float:
+    """The number of a text in its unit, which the text does not name."""
+    try:
+        return float(text)
+    except ValueError:
+        raise typer.BadParameter(f"{printable(text)} is no number{f' in {unit}' if unit else ''}") from None
 
 
 def _plain_type(annotation: Any) -> Any:

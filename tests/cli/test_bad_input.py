@@ -232,3 +232,31 @@ def test_a_case_whose_name_begins_with_a_dash_is_suggested_as_a_path(here: Path)
 def test_a_key_that_cannot_be_varied_is_told_of_the_option_that_named_it(here: Path, vary: str) -> None:
     told = brakecli("stability", "tiny.toml", "--vary", vary, cwd=here).told(2, f"--vary {vary[:4]}")
     assert "--set" not in told
+
+
+def test_what_another_command_computes_is_told_with_that_command(tmp_path: Path) -> None:
+    (tmp_path / "study.toml").write_text(
+        'case = "c.toml"\nsamples = 64\n[[parameter]]\nkey = "shoe.mass"\nmean = 1.0\ndeviation = 0.1\n'
+    )
+    (tmp_path / "sweep.toml").write_text('case = "c.toml"\n[[axis]]\nparameter = "shoe.mass"\nvalues = [1.0]\n')
+    for words, told in (
+        (("sweep", "study.toml"), "this is a study; compute it with: brakecli scatter study.toml"),
+        (("scatter", "sweep.toml"), "this is a sweep; compute it with: brakecli sweep sweep.toml"),
+    ):
+        done = brakecli(*words, cwd=tmp_path)
+        assert (done.code, done.err) == (2, f"brakecli: {words[1]}: {told}\n")
+
+
+def test_a_number_with_a_unit_is_told_of_its_option(tmp_path: Path) -> None:
+    done = brakecli("new", "b", "--frequency", "2.6kHz", cwd=tmp_path)
+    assert done.code == 2
+    assert "--frequency" in done.err
+    assert "2.6kHz is no number in Hz" in " ".join(done.err.split())
+    assert not [*tmp_path.iterdir()]
+
+
+def test_a_text_file_without_its_quantity_is_told_of_that_first(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("t,a\n0,1\n")
+    done = brakecli("classify", "x.csv", cwd=tmp_path)
+    remedy = "state with --quantity what was measured; or name an intact result file, or compute it again"
+    assert f"this is not an HDF5 file; for a measured signal, {remedy}" in done.err

@@ -227,15 +227,20 @@ def _wrong_points(plan: Plan) -> list[Problem]:
 
 def kind_of(text: str) -> str:
     """What a text is meant to be, by its keys at the top: "case", "sweep", "study", or none of them."""
-    try:
-        keys = set(Located(text).data)
-    except CaseError:
-        return ""
+    keys = keys_at_top(text)
     if "shoe" in keys:
         return "" if keys & {"axis", "critical"} else "case"
     if "parameter" in keys:
         return "study"
     return "sweep" if keys & {"case", "axis", "critical", "points"} else ""
+
+
+def keys_at_top(text: str) -> set[str]:
+    """The keys at the top of a text, none of one that is no TOML."""
+    try:
+        return {*Located(text).data}
+    except CaseError:
+        return set()
 
 
 def label(value: Any) -> str:

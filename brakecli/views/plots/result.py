@@ -60,12 +60,14 @@ def _opened(
 
     with ExitStack() as stack:
         stored = [stack.enter_context(open_result(result)) for result in results]
-        file = stack.enter_context(new_output(target, force=force))
         stack.enter_context(style.applied())
 
         def write(figure: "Figure") -> "Figure":
-            file.write(style.rendered(figure, suffix))
-            file.publish()
+            with new_output(
+                target, force=force
+            ) as file:  # what cannot be drawn has more to say than an old picture
+                file.write(style.rendered(figure, suffix))
+                file.publish()
             vars(figure)["_repr_png_"] = partial(style.rendered, figure, ".png")  # by which notebooks show it
             return figure
 
