@@ -155,7 +155,9 @@ def _numbers(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
         amplitude = show.with_error(known, spread if spread is not None and spread < known else None, "m")
         rows.append(Row("amplitude of x", amplitude + _when(numbers), detail=changes))
     shares = _known(numbers, "stick_fraction", "contact_loss_fraction")
-    rows += [Row(each.title, show.field(each, share), detail=changes or not share) for each, share in shares]
+    for each, share in shares:
+        aside_here = changes and each.name != "stick_fraction"
+        rows.append(Row(each.title, show.field(each, share), detail=aside_here or not share))
     aside = [Row("regime", str(numbers.get("regime", "")))]
     told = [name for name in _ASIDE if name != "ringing_frequency" or numbers.get("damping_ratio") is None]
     aside += [Row(each.title, show.field(each, value)) for each, value in _known(numbers, *told)]
@@ -203,7 +205,7 @@ def _certificate(numbers: Mapping[str, Any]) -> list[Row]:
         return []
     found = "not known" if error is None else f"{'at most ' if certified else ''}{error:.1e} of its largest value"
     by = numbers.get("certified_by")
-    return [Row("error of the motion", found), *details(*[Row("known by", str(by))] * bool(by))]
+    return [Row("numerical error of the motion", found), *details(*[Row("known by", str(by))] * bool(by))]
 
 
 def _scheme(numbers: Mapping[str, Any]) -> str:

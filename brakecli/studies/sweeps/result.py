@@ -272,9 +272,11 @@ def _on_settled(journal: Journal) -> Iterator[str]:
         return f"{' to '.join(ends)} s"
 
     count = f"all {size}" if settled.all() else f"{int(settled.sum())} of {size}"
-    said = f"{count} points are decided" + (f", in {ran(settled)}" if settled.any() else "")
+    said = f"{count} points are decided" + (f", in {ran(settled)} of motion" if settled.any() else "")
     yield said + (
-        f"; others ran for {ran(others)}, and their reasons say more" if (others := done & ~settled).any() else ""
+        f"; others ran for {ran(others)} of it, and their reasons say more"
+        if (others := done & ~settled).any()
+        else ""
     )
 
 

@@ -258,7 +258,7 @@ def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
         regimes = stored.read("/", "regime")
     assert report.findings.warnings == []
     ran = " to ".join(f"{each:.4g}" for each in durations)
-    assert report.findings.sentences == [f"all 2 points are decided, in {ran} s"]
+    assert report.findings.sentences == [f"all 2 points are decided, in {ran} s of motion"]
     alone = [
         settle_case(parse_case(OPEN, "", [f"friction.coefficient={phi}"]).case).system for phi in (0.3, 0.565)
     ]
@@ -273,7 +273,8 @@ def test_a_sweep_counts_the_points_that_have_not_settled(tmp_path: Path) -> None
     made += [{"regime": "undecided", "duration": 32.0}, {"status": "failed"}]
     loaded = write_sweep(tmp_path, SPEEDS.format(5), case=OPEN)
     said = inline(loaded, tmp_path / "s.h5", made_of(made)).findings.sentences
-    ran = "2 of 5 points are decided, in 2 to 4 s; others ran for 16 to 32 s, and their reasons say more"
+    ran = "2 of 5 points are decided, in 2 to 4 s of motion; "
+    ran += "others ran for 16 to 32 s of it, and their reasons say more"
     assert ran in said
     numbers = write_sweep(tmp_path, axis("solver.duration", "values = [0.1, 0.2]"), case=OPEN)
     said = inline(numbers, tmp_path / "n.h5", made_of(made)).findings.sentences
@@ -351,7 +352,7 @@ def test_the_starter_of_hysteresis_finds_the_loop_of_the_branch(tmp_path: Path) 
     where = f"along friction.coefficient the vibration {up}, and {down}"
     ran = (report.findings.variables or {})["duration"]
     ends = f"{np.min(ran):.4g} to {np.max(ran):.4g} s"
-    settled_ = f"all 12 points are decided, in {ends}"
+    settled_ = f"all 12 points are decided, in {ends} of motion"
     assert report.findings.sentences == [f"hysteresis at {sum(loop)} of 6 points: {where}", settled_]
 
 
