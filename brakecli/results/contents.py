@@ -92,6 +92,11 @@ def contents(result: StoredResult) -> dict[str, Any]:
     return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
 
 
+def _is_aside(name: str) -> bool:
+    """Whether a variable says how well another one is known, or where it was sought: it is no result by itself."""
+    return name.endswith("_error") or "windows" in name
+
+
 @dataclass(frozen=True)
 class Difference:
     """How a second result differs from a first one; `DIFFERENCE_OF_TWO` declares it."""
@@ -122,7 +127,7 @@ class Difference:
             said += [f"the verdict differs: {each['a']} and {each['b']}" for each in pairs]
             said += [f"the verdict differs at {each['different']} of {each['compared']} points" for each in places]
             said += ["the verdict is the same"] * (not pairs and not places)
-        if known := [each for each in self.variables if each["relative"]]:
+        if known := [each for each in self.variables if each["relative"] and not _is_aside(each["name"])]:
             most = max(known, key=lambda each: each["relative"])
             units = "" if most["units"] == "1" else f" {plain_units(most['units'])}"
             size = f"{most['largest']:.3g}{units}, {most['relative']:.3g} times its largest value"

@@ -23,6 +23,9 @@ from brakecli.views.view import Table as Columns
 Numbers = Mapping[str, tuple[Any, str]]
 """What results are compared by: values with their units, by their names."""
 
+Shares = tuple[float, float, float]
+"""Part of the brakes that squeal, and both ends of its 95 % interval."""
+
 # of a picture: a third of the bytes, and no difference that could be seen
 _COLOURS = 255
 _DPI = 120
@@ -93,6 +96,7 @@ class Part:
     numbers: Numbers
     versions: Mapping[str, str] = field(default_factory=dict)
     advice: AdviceReport | None = None  # of a run
+    squeal: Shares | None = None  # of a study
 
 
 @dataclass(frozen=True)

@@ -80,7 +80,9 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     name = escaped(result.path.name)
     title = loaded.case.title or "Case without a title"
     of_theory = numbers_of(named(ADVICE, "critical_friction", "margin", "squeal_probability"), advice.numbers())
-    numbers = {**of_theory, **numbers_of(named(fields.VERDICT, *_MAIN), found)}
+    growth = advice.stability.modes[0].growth if advice.stability.modes else None  # of small motions, by theory
+    known = {**found, "growth_rate": growth if found.get("growth_rate") is None else found["growth_rate"]}
+    numbers = {**of_theory, **numbers_of(named(fields.VERDICT, *_MAIN), known)}
     drawn = picture(PICTURE, partial(draw, result))
     change = [*_to_change(advice, found.get("regime"))]
     sections = partial(_appendix, result, loaded, advice)

@@ -16,6 +16,7 @@ from brakecli.views.reports.blocks import (
     PER_CENT,
     Beside,
     Part,
+    Shares,
     Table,
     Texts,
     key_unit,
@@ -40,6 +41,8 @@ _NARROW = 2  # results whose picture stands beside their numbers, and not below 
 _NAMED = 2  # changed keys by which the results are named
 _CHOSEN = "solver.duration", "output.sample_interval"  # by the program, where a file gives no numbers
 _SAME = "same"
+_ABOUT = "key", "parameter"  # of the tables of a study and of a sweep
+_IN_ITS_UNIT = "low", "high", "mean", "mode", "deviation", "start", "stop", "values"
 
 
 def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -> Beside | None:
@@ -62,7 +65,8 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         if name in _CHOSEN and name not in fixed:
             chosen += [f"{name} ({', '.join(texts)})"] * (len({*texts}) > 1)
         elif name != "title" and {} not in values:  # which stands for a table without keys
-            case.append((name, *values, key_unit(name)))
+            told, units = _with_its_key(name, every)
+            case.append((told, *values, units))
     known = {name: units for part in parts for name, (_, units) in part.numbers.items()}
     numbers = []
     for name, units in known.items():
@@ -70,9 +74,7 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         if {*map(str, values)} - {"None", ""}:
             numbers.append((name, *values, units))
     single = [row for row in case if all(isinstance(each, str | int | float) for each in row[1:-1])][:_NAMED]
-    apart = [
-        ", ".join(f"{row[0]} = {shown(row[side], row[-1])}" for row in single) for side in range(1, len(parts) + 1)
-    ]
+    apart = [_told(single, side) for side in range(1, len(parts) + 1)]
     names = [", ".join(filter(None, pair)) for pair in zip((part.name for part in parts), apart, strict=True)]
     letters = "ABC"[: len(parts)]
     files = [f"{letter}: {part.name}" for letter, part in zip(letters, parts, strict=True)]
@@ -86,7 +88,7 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
     if len({*titles}) == 1:
         steps = [f"{name} {' → '.join(shown(each, units) for each in values)}" for name, *values, units in single]
         title = f"{titles[0]}: {', '.join(steps) or ' – '.join(names)}"
-        titles = [": ".join(filter(None, pair)) for pair in zip(titles, apart, strict=True)]
+        titles = [", ".join(filter(None, pair)) for pair in zip(files, apart, strict=True)]
     head = ("", *letters, *(f"{letter} against A" for letter in letters[1:]))
     most = len(case) if full else _MOST_KEYS
     blocks: list[Any] = [_table(case[:most], head) if case else Texts(["The cases are the same."])]
@@ -98,7 +100,34 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         blocks.append(Texts([f"Not given as numbers in the files, and different, too: {', '.join(chosen)}."]))
     advice = [each.advice for each in parts if each.advice]
     best = best_of(dict(zip(letters, advice, strict=True))) if len(advice) == len(parts) else ""
+    squeal = [each.squeal for each in parts if each.squeal]
+    if len(squeal) == len(parts):
+        best = seldom_of(dict(zip(letters, squeal, strict=True)))
     return Beside(title, best, names, titles, blocks, _table(numbers, head), pictures)
+
+
+def _told(rows: Sequence[tuple[Any, ...]], side: int) -> str:
+    """The changed keys of one result with their values; both ends of a range together."""
+    said = list[str]()
+    for row, after in zip(rows, [*rows[1:], ("",)], strict=True):
+        value = shown(row[side], row[-1])
+        key, _, end = row[0].rpartition(", ")
+        if end == "low" and after[0] == f"{key}, high":
+            value = f"{shown(row[side])} … {shown(after[side], after[-1])}"
+            said.append(f"{key} {value}")
+        elif end != "high" or not said or not said[-1].startswith(f"{key} "):
+            said.append(f"{row[0]} = {value}")
+    return ", ".join(said)
+
+
+def _with_its_key(name: str, every: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
+    """A key of a sweep or a study by the key of the case that it is about, if that is the same, and its unit."""
+    table, _, what = name.rpartition(".")
+    about = [next((each[f"{table}.{key}"] for key in _ABOUT if f"{table}.{key}" in each), "") for each in every]
+    one = about[0]
+    if "[" not in table or what in _ABOUT or not isinstance(one, str) or not one or about.count(one) < len(about):
+        return name, key_unit(name)
+    return f"{one}, {what}", key_unit(one) if what in _IN_ITS_UNIT else ""
 
 
 def best_of(designs: Mapping[str, AdviceReport]) -> str:
@@ -130,6 +159,21 @@ def best_of(designs: Mapping[str, AdviceReport]) -> str:
     elif both:
         said = f"{listed(both)} {'is' if len(both) == 1 else 'are'} {better} against squeal"
     return sentence(f"{said}: {'; '.join(by)}")
+
+
+def seldom_of(squeal: Mapping[str, Shares]) -> str:
+    """Of which designs fewest squeal; empty where the 95 % intervals of all meet that of the fewest."""
+    least = min(squeal.values())
+    seldom = [name for name, each in squeal.items() if each[1] <= least[2]]
+    if len(seldom) == len(squeal):
+        return ""
+    better = "better" if len(squeal) == 2 else "best"
+    said = f"{listed(seldom)} {'is' if len(seldom) == 1 else 'are'} {better} against squeal"
+    shares = [
+        f"{100.0 * each:.3g} % ({100.0 * low:.3g} to {100.0 * high:.3g} %) of {name}"
+        for name, (each, low, high) in squeal.items()
+    ]
+    return sentence(f"{said}: {listed(shares)} squeal")
 
 
 def _times(advice: AdviceReport) -> float:

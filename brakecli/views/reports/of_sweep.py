@@ -46,6 +46,7 @@ from brakecli.views.stability import of_branch, of_lock_in, of_scatter
 from brakecli.views.view import sentence
 
 MOST_FAILURES = 20
+_PROBABILITY = "probability", "probability_lower", "probability_upper"
 _TEXTS = ("regime", "excitation", "critical_status", "sustained_status", "reason")
 _ERRORS = ("estimated_error", "critical_error", "critical_bias", "unconverged_steps")
 _IDLE = ("settled", "settled_from", "steps", "contact_evaluations", "unconverged_steps", "warning_count")
@@ -166,7 +167,8 @@ def part_of_other(result: StoredResult) -> Part:
         if each.name not in apart and each.in_file
     ]
     held = stored_numbers(result)
-    compared = numbers_of(known, result.attributes)
+    results = [each for each in known if not each.name.endswith("_error") and "windows" not in each.name]
+    compared = numbers_of(results, result.attributes)  # how well a number is known is none to compare by
     drawn = picture(_PICTURES[kind], partial(draw, result))
     views = {
         "stability": lambda: of_lock_in(held, PAGE, key),
@@ -185,7 +187,11 @@ def part_of_other(result: StoredResult) -> Part:
             f"probability: {PROBABLE.get(name, name)}": share(each) for name, each in held["probability"].items()
         }
         compared = {**shares, **compared}
-    return _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", blocks_of(view))], compared)
+    part = _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", blocks_of(view))], compared)
+    if kind != "scatter" or "squeal" not in held["probability"]:
+        return part
+    middle, low, high = (float(held[name]["squeal"]) for name in _PROBABILITY)
+    return replace(part, squeal=(middle, low, high))
 
 
 def _study(result: StoredResult) -> tuple[str, list[Table]]:

@@ -244,7 +244,7 @@ def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
     beside = both.html[: both.html.index('<article id="part-1">')]
     apart = [f"shoe.mass = {one}\u00a0kg, friction.coefficient = {two}" for one, two in ((10, 0.6), (12, 0.3))]
     assert re.findall(r"<h2>(.: .*)</h2>", beside) == [f"A: a.h5, {apart[0]}", f"B: b.h5, {apart[1]}"]
-    assert re.findall("<h1>(.*)</h1>", both.html)[1:] == [f"Tiny: {each}" for each in apart]
+    assert re.findall("<h1>(.*)</h1>", both.html)[1:] == [f"A: a.h5, {apart[0]}", f"B: b.h5, {apart[1]}"]
     assert beside.count("By theory, of small vibration and by eigenvalues: ") == 2
     assert beside.count("<figure>") == 1
     found = {cells[0]: (marked, cells[1:]) for marked, cells in rows(beside)}
@@ -333,6 +333,24 @@ def test_the_better_design_is_named_by_its_margin_and_by_its_squeal_under_a_scat
     three = {"A": design(often), "B": design(seldom, less), "C": design(seldom, less)}
     assert best_of(three).startswith("B and C are best against squeal: ")
     assert best_of({"A": design(often), "B": design(None, "wheel.angular_speed=0.0")}) == ""
+
+
+def test_of_two_studies_the_better_one_is_named_where_their_intervals_do_not_meet() -> None:
+    often, near, seldom = (0.138, 0.133, 0.142), (0.145, 0.14, 0.15), (0.011, 0.008, 0.013)
+    assert of_several.seldom_of({"A": often, "B": seldom}) == (
+        "B is better against squeal: 13.8 % (13.3 to 14.2 %) of A and 1.1 % (0.8 to 1.3 %) of B squeal."
+    )
+    assert of_several.seldom_of({"A": often, "B": near}) == ""
+    assert of_several.seldom_of({"A": often, "B": near, "C": seldom}).startswith("C is best against squeal: ")
+
+
+def test_keys_of_a_study_are_named_by_the_key_that_scatters() -> None:
+    each = {"parameter[4].key": "link2.angle_deg", "parameter[4].low": 4.0}
+    assert of_several._with_its_key("parameter[4].low", [each, each]) == ("link2.angle_deg, low", "deg")
+    other = {"parameter[4].key": "shoe.mass", "parameter[4].low": 4.0}
+    assert of_several._with_its_key("parameter[4].low", [each, other])[0] == "parameter[4].low"
+    rows = [("link2.angle_deg, low", 4.0, 5.5, "deg"), ("link2.angle_deg, high", 6.0, 7.5, "deg")]
+    assert of_several._told(rows, 1) == "link2.angle_deg 4 … 6\u00a0deg"
 
 
 @pytest.mark.parametrize(
