@@ -1,6 +1,7 @@
 """The view of a motion: of a run, of a stored run, or of a measured signal."""
 
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -23,6 +24,7 @@ _FORCED = "it does not vibrate by itself, the roughness of the wheel shakes it (
 _FEW_STICK = "it vibrates, without stick in most cycles (quasi-harmonic)"
 _LENGTH = re.compile(r"(\d+(?:\.\d+)?(?:e[-+]\d+)?) m(?![\w/²·])")
 _TORQUE = ("braking_torque", "torque_variation")
+_ROUNDINGS = 16 * sys.float_info.epsilon  # of the two dozen sums and products of a step, each half of one at most
 _ASIDE = (
     *("excitation", "mean_friction_force", "amplitude_first", "forced_frequency", "growth_rate"),
     *("ringing_frequency", "amplitude_forced", "amplitude_own"),
@@ -31,6 +33,7 @@ _ASIDE = (
 
 def of_run(numbers: Mapping[str, Any], title: str, output: str, show: Renderer) -> View:
     """A run, by the names and values that `--json` gives them."""
+    numbers = above_rounding(numbers)
     resolution = numbers["frequency_resolution"]
     peak = numbers["spectrum_peak"]
     error = abs(numbers["energy"]["relative_closing_error"])
@@ -55,6 +58,7 @@ def of_run(numbers: Mapping[str, Any], title: str, output: str, show: Renderer) 
 
 def of_verdict(numbers: Mapping[str, Any], source: str, show: Renderer) -> View:
     """A verdict with its evidence, by the names and values that `--json` gives them."""
+    numbers = above_rounding(numbers)
     unit = str(numbers.get("unit") or "")
     noise_unit = "m/s" if unit == "m/s²" else unit  # an acceleration is judged by its integral
     rows = [*_ringing(numbers, show), *_numbers(numbers, show), *_torque(numbers, show)]
@@ -141,6 +145,19 @@ def _while_it_changes(numbers: Mapping[str, Any], show: Renderer) -> str:
     stands = (numbers.get("evidence") or {}).get("wheel_stands")
     after = ", then rests" if stands else ""
     return sentence(f"it vibrates {', '.join(said)}{more}{after}")
+
+
+def above_rounding(numbers: Mapping[str, Any]) -> dict[str, Any]:
+    """The numbers of a motion, those at rest 0 that are no more than the rounding of steady sliding itself.
+
+    There the torque has the size of its mean. The friction force F strains the links to the energy E, and a
+    displacement of 2E/F, that of a spring which takes all of it.
+    """
+    torque, force = (abs(numbers.get(name) or 0.0) for name in ("braking_torque", "mean_friction_force"))
+    links = (numbers.get("energy") or {}).get("links") or 0.0
+    sizes = {"torque_variation": torque, "amplitude": 2.0 * links / force if force else 0.0}
+    small = [name for name, size in sizes.items() if abs(numbers.get(name) or 0.0) <= _ROUNDINGS * size]
+    return {**numbers, **{name: 0.0 for name in small if numbers.get(name) is not None}}
 
 
 def _numbers(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:

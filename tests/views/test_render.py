@@ -7,6 +7,7 @@ import pytest
 from brakecli.results import fields
 from brakecli.results.field import Field, integer, ratio
 from brakecli.results.stability_fields import SCATTER
+from brakecli.views.motion import above_rounding
 from brakecli.views.render import TERMINAL, text_of
 from brakecli.views.reports.blocks import PAGE
 
@@ -59,3 +60,19 @@ def test_numbers_of_the_terminal_have_the_form_that_is_asked_for() -> None:
     assert text_of(1.0 / 3.0, "Hz", ".3g") == "0.333 Hz"
     assert text_of(None, "Hz", ".3g") == "-"
     assert text_of(2.0, "(m/s)2 Hz-1") == "2 (m/s)^2/Hz"
+
+
+def test_what_is_rounding_of_steady_sliding_is_shown_as_0() -> None:
+    """A spring of c under the force F: the energy F²/2c and the displacement F/c."""
+    force, stiffness, lever = 900.0, 1.6e8, 0.5
+    numbers = {
+        "mean_friction_force": force,
+        "braking_torque": lever * force,
+        "energy": {"links": 0.5 * force**2 / stiffness},
+        "amplitude": 2.0**-52 * force / stiffness,
+        "torque_variation": 2.0**-51 * lever * force,
+    }
+    found = above_rounding(numbers)
+    assert (found["amplitude"], found["torque_variation"]) == (0.0, 0.0)
+    larger = {**numbers, "amplitude": 1e-12 * force / stiffness, "torque_variation": 1e-12 * lever * force}
+    assert above_rounding(larger) == larger

@@ -26,7 +26,7 @@ from brakecli.solver.integrate import Counted
 from brakecli.studies.runs.advise import AdviceReport, advise
 from brakecli.studies.scattering.advised import under_tolerance
 from brakecli.studies.sweeps.result import unit
-from brakecli.views.motion import motion_sentence, reasons_of
+from brakecli.views.motion import above_rounding, motion_sentence, reasons_of
 from brakecli.views.plots import lock_in, style
 from brakecli.views.plots.result import draw
 from brakecli.views.plots.run import case_of
@@ -81,7 +81,10 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     title = loaded.case.title or "Case without a title"
     of_theory = numbers_of(named(ADVICE, "critical_friction", "margin", "squeal_probability"), advice.numbers())
     growth = advice.stability.modes[0].growth if advice.stability.modes else None  # of small motions, by theory
-    known = {**found, "growth_rate": growth if found.get("growth_rate") is None else found["growth_rate"]}
+    known = {
+        **above_rounding(stored_numbers(result)),
+        "growth_rate": growth if found.get("growth_rate") is None else found["growth_rate"],
+    }
     numbers = {**of_theory, **numbers_of(named(fields.VERDICT, *_MAIN), known)}
     drawn = picture(PICTURE, partial(draw, result))
     change = [*_to_change(advice, found.get("regime"))]
