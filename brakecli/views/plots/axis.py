@@ -28,6 +28,7 @@ class Axis:
     units: str
     values: style.Array
     texts: tuple[str, ...] | None = None
+    offset: bool = False  # of the state of steady sliding, and not the state itself
 
     @property
     def logarithmic(self) -> bool:
@@ -94,5 +95,5 @@ class Axis:
             if self.logarithmic:
                 axis.axes.set(**{f"{side}scale": "log"})
             style.set_ticks(axis, values[0], values[-1], self.units)
-        key = textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …")
+        key = textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …") + ", from equilibrium" * self.offset
         axis.set_label_text(style.labelled(key, units), parse_math=False)

@@ -182,6 +182,10 @@ def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:
     scaled = axes.transScale + axes.transLimits
     ends = [(0.0, 0.0 if all(up) else -0.09), (0.0, 1.09 if any(up) else 1.0)]
     axes.set_ylim(*scaled.inverted().transform(ends)[:, 1])
+    if there and not all(up):  # on a line of their own, apart from the values
+        edge = scaled.inverted().transform([(0.0, -0.03)])[0, 1]
+        axes.axhline(edge, color=style.GREY, lw=0.8, zorder=0.6)
+        axes.set_yticks([tick for tick in axes.get_yticks() if tick >= edge])
     for chosen, look in there:
         height = np.full(int(chosen.sum()), 0.965 if look["marker"] == "^" else 0.035)
         transform = axes.get_xaxis_transform()
@@ -199,4 +203,6 @@ def _bars(axes: Axes, x: style.Array, value: style.Array, error: style.Array, si
     if seen.any():
         axes.errorbar(x[seen], value[seen], error[seen], label="error bar", **look)
     if hidden := style.largest(error[~seen & np.isfinite(value)]):
-        axes.plot([], [], " ", label=f"errors up to {style.readable(hidden, 2)} lie within the dots")
+        axes.plot(
+            [], [], "|", color=style.BLUE, label=f"errors up to {style.readable(hidden, 2)} lie within the dots"
+        )

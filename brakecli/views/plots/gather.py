@@ -19,6 +19,7 @@ from brakecli.studies.sweeps.record import Status
 from brakecli.studies.sweeps.tables import Sweep
 from brakecli.views.plots import style
 from brakecli.views.plots.axis import Axis
+from brakecli.views.plots.run import case_of
 from brakecli.views.plots.sweep import ATTRACTOR, FORCED_PART, MARGIN, MOST_PANELS, SweepPicture
 
 _NEEDED = ("status", "regime", "excitation", "amplitude", "frequency")
@@ -82,7 +83,10 @@ def _axis(result: StoredResult, name: str, values: style.Array) -> Axis:
     about = result.variables("/")[name].attributes
     texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
     places = (np.arange(len(values)) if texts else values).astype(np.float64)
-    return Axis(name, str(about.get("long_name", "")), style.unit_of(about), places, texts)
+    key = str(about.get("long_name", ""))
+    state = {f"initial.{each}" for each in ("x", "y", "vx", "vy")}
+    offset = {*key.split(", ")} <= state and case_of(result).case.initial.at == "equilibrium"
+    return Axis(name, key, style.unit_of(about), places, texts, offset)
 
 
 def _listed(result: StoredResult) -> tuple[tuple[Axis, style.Array], ...]:

@@ -71,6 +71,11 @@ def draw(picture: SweepPicture) -> Figure:
             axes.label_outer()
             if not sliced or axes is row[0]:
                 axes.set_title(name if sliced else layer + name, parse_math=False)
+    if np.ma.getmaskarray(np.ma.asarray(mesh.get_array())).all():  # no colour means anything
+        for axes in panels[-1] if sliced else panels[:, -1]:
+            axes.text(0.5, 0.5, "no values to draw", transform=axes.transAxes, ha="center", color="#444444")
+        sweep.add_legend(figure)
+        return figure
     bar = figure.colorbar(mesh, ax=panels[-1] if sliced else panels, extend=scale.extend, aspect=30, pad=0.015)
     low, high = (value or 0.0 for value in mesh.get_clim())
     style.set_ticks(bar.ax.yaxis, low, high)
