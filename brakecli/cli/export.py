@@ -45,16 +45,16 @@ class Export:
 @with_options
 def command(options: Export, quiet: Quiet = False) -> None:
     """Write numbers as CSV, or a motion as sound."""
-    from brakecli.results.export import Part, export
+    from brakecli.results.export import Excerpt, export
     from brakecli.results.read import open_result
 
     target = result_path(options.output, options.result, ending=".csv")
     start = -math.inf if options.start is None else options.start
     end = math.inf if options.end is None else options.end
-    part = Part(start, end, options.every)
+    excerpt = Excerpt(start, end, options.every)
     with telling(quiet) as tell, open_result(Path(options.result)) as stored:
         notes = export(
-            stored, target, options.group, options.variables or (), part, force=options.force, tell=tell
+            stored, target, options.group, options.variables or (), excerpt, force=options.force, tell=tell
         )
     warn(*notes)
     if not quiet:

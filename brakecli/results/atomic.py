@@ -145,9 +145,9 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
         with signals_deferred(), explained(path):
             descriptor = _acquired(path, lock)
             clean_up.callback(_release, descriptor, lock)
-            part = target.with_name(f".{target.name}.part")
-            if os.path.lexists(part) and not os.fstat(descriptor).st_size:  # a killed process leaves both
-                raise _not_ours(part)
+            temporary = target.with_name(f".{target.name}.part")
+            if os.path.lexists(temporary) and not os.fstat(descriptor).st_size:  # a killed process leaves both
+                raise _not_ours(temporary)
             os.ftruncate(descriptor, 0)
             os.pwrite(descriptor, f"process {os.getpid()} on {socket.gethostname()}\n".encode(), 0)
             output = OutputFile(path, target, force=force)

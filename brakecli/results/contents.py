@@ -80,16 +80,18 @@ DIFFERENCE_OF_TWO = (
 
 def contents(result: StoredResult) -> dict[str, Any]:
     """What `INFO` declares."""
-    held = []
+    variables = []
     for group in result.groups:
-        for name, each in result.variables(group).items():
-            units, meaning = (str(each.attributes.get(name, "")) for name in ("units", "long_name"))
+        for name, variable in result.variables(group).items():
+            units, meaning = (str(variable.attributes.get(name, "")) for name in ("units", "long_name"))
             about = {"units": units, "meaning": meaning}
-            held.append({"group": group, "name": name, "dims": each.dims, "shape": each.shape, **about})
+            variables.append(
+                {"group": group, "name": name, "dims": variable.dims, "shape": variable.shape, **about}
+            )
     attributes = result.attributes
-    known = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
+    facts = {name: attributes.get(name) for name in ("status", "kind", "title", "format_version")}
     sizes = {"whole": True, "bytes": result.length}
-    return {"path": str(result.path), **known, **sizes, "versions": result.versions, "variables": held}
+    return {"path": str(result.path), **facts, **sizes, "versions": result.versions, "variables": variables}
 
 
 def _is_aside(name: str) -> bool:
@@ -117,18 +119,18 @@ class Difference:
         """What differs: keys of the case, the verdict, and which variable does most, beside its largest value."""
         if self.same:
             return "no difference in case, numbers and variables"
-        names = [str(each["name"]) for each in self.case]
-        rest = len(names) - _NAMED
-        more = f" and {rest} more key{'s' * (rest > 1)}" if rest > 0 else ""
+        names = [str(key["name"]) for key in self.case]
+        remaining = len(names) - _NAMED
+        more = f" and {remaining} more key{'s' * (remaining > 1)}" if remaining > 0 else ""
         said = [f"the case differs in {', '.join(names[:_NAMED])}{more}" if names else "the case is the same"]
         if self.judged:
-            pairs = [each for each in self.numbers if each["name"] == "regime"]
-            places = [each for each in self.variables if each["name"] == "regime" and each["different"]]
-            said += [f"the verdict differs: {each['a']} and {each['b']}" for each in pairs]
-            said += [f"the verdict differs at {each['different']} of {each['compared']} points" for each in places]
+            pairs = [row for row in self.numbers if row["name"] == "regime"]
+            places = [row for row in self.variables if row["name"] == "regime" and row["different"]]
+            said += [f"the verdict differs: {row['a']} and {row['b']}" for row in pairs]
+            said += [f"the verdict differs at {row['different']} of {row['compared']} points" for row in places]
             said += ["the verdict is the same"] * (not pairs and not places)
-        if known := [each for each in self.variables if each["relative"] and not _is_aside(each["name"])]:
-            most = max(known, key=lambda each: each["relative"])
+        if numeric := [row for row in self.variables if row["relative"] and not _is_aside(row["name"])]:
+            most = max(numeric, key=lambda row: row["relative"])
             units = "" if most["units"] == "1" else f" {plain_units(most['units'])}"
             size = f"{most['largest']:.3g}{units}, {most['relative']:.3g} times its largest value"
             said.append(f"{most['name']} differs most, by up to {size}")
@@ -137,38 +139,38 @@ class Difference:
 
 def difference(a: StoredResult, b: StoredResult) -> Difference:
     """Compare two results of one kind; raises UsageError for two kinds, UnreadableResultError."""
-    kinds = [str(each.attributes.get("kind")) for each in (a, b)]
+    kinds = [str(file.attributes.get("kind")) for file in (a, b)]
     if kinds[0] != kinds[1]:
         what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
         raise UsageError(f"{what}: they hold different things; name two results of one kind")
     groups = list(dict.fromkeys([*a.groups, *b.groups]))
     numbers: list[dict[str, Any]] = [{}, {}]
-    for found, result in zip(numbers, (a, b), strict=True):
+    for attributes, result in zip(numbers, (a, b), strict=True):
         for group in groups:
             for name, value in result.group_attributes(group).items() if group in result.groups else ():
                 if name not in _APART and not name.endswith("_version"):
                     value = plain(value)  # xarray takes a list of one for a number
                     value = value[0] if isinstance(value, list) and len(value) == 1 else value
-                    found[name if group == "/" else f"{group}/{name}"] = value
+                    attributes[name if group == "/" else f"{group}/{name}"] = value
     declared = DECLARED.get(kinds[0], ())
     rows = ((field.group, row) for field in declared for row in (field.rows if field.group else [field]))
     units = {f"{group}/{row.name}": row.units for group, row in rows}
     units |= {f"spectrum/{field.name}": field.units for field in WELCH}
     differing = [*changed(*numbers)]
-    for each in differing:
-        each["units"] = units.get(each["name"], units.get(f"/{each['name']}", ""))
-    variables = [each for group in groups for each in _variables(a, b, group)]
+    for number in differing:
+        number["units"] = units.get(number["name"], units.get(f"/{number['name']}", ""))
+    variables = [variable for group in groups for variable in _variables(a, b, group)]
     of_program = [*changed(a.versions, b.versions)]
-    judged = all("regime" in {**each.attributes, **each.variables("/")} for each in (a, b))
+    judged = all("regime" in {**file.attributes, **file.variables("/")} for file in (a, b))
     return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program, judged)
 
 
 def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, Any]:
     """All keys of the case, and of the sweep or the study, with their values."""
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for name in texts:
-        found |= flat(parse(str(result.attributes.get(name, "")), f"{result.path}: {name}"))
-    return found
+        values |= flat(parse(str(result.attributes.get(name, "")), f"{result.path}: {name}"))
+    return values
 
 
 def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
@@ -180,24 +182,24 @@ def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
 
 def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
     """The variables of a group that differ, at the same places along their axis."""
-    known = [each.variables(group) if group in each.groups else {} for each in (a, b)]
-    for name in dict.fromkeys([*known[0], *known[1]]):
-        held = [each[name] for each in known if name in each]
-        shapes = [list(each[name].shape) if name in each else [] for each in known]
+    by_name = [file.variables(group) if group in file.groups else {} for file in (a, b)]
+    for name in dict.fromkeys([*by_name[0], *by_name[1]]):
+        pair = [variables[name] for variables in by_name if name in variables]
+        shapes = [list(variables[name].shape) if name in variables else [] for variables in by_name]
         compared = different = 0
         largest = highest = 0.0
-        coded = any("flag_meanings" in each.attributes for each in held)
+        coded = any("flag_meanings" in variable.attributes for variable in pair)
         numeric = True
         along = None
         if all(shapes) and shapes[0][1:] == shapes[1][1:]:
-            along = _other_places(a, b, group, held)
+            along = _other_places(a, b, group, pair)
             for one, other in (_pairs if along is None else _interpolated)(a, b, group, name, along or ""):
                 numeric = not coded and one.dtype.kind in "iuf" and other.dtype.kind in "iuf"
                 apart = one != other
                 if numeric:
                     there = (one != FILL) & (other != FILL)
                     off = np.where(there, np.abs(1.0 * one - other), 0.0)
-                    sizes = [float(np.abs(each[there]).max(initial=0.0)) for each in (one, other)]
+                    sizes = [float(np.abs(values[there]).max(initial=0.0)) for values in (one, other)]
                     apart &= ~there | (off > (_ROUNDING * max(sizes) if along else 0.0))
                     largest = max(largest, float(off.max(initial=0.0)))
                     highest = max(highest, *sizes)
@@ -212,15 +214,15 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
                 "different": different,
                 "largest": largest if numeric and compared else None,
                 "relative": largest / highest if numeric and highest else None,
-                "units": str(held[0].attributes["units"]),
+                "units": str(pair[0].attributes["units"]),
                 "interpolated": along,
             }
 
 
-def _other_places(a: StoredResult, b: StoredResult, group: str, held: list[Variable]) -> str | None:
+def _other_places(a: StoredResult, b: StoredResult, group: str, pair: list[Variable]) -> str | None:
     """The name of the axis of a variable, if it has one of numbers with other values in the second result."""
-    axis = held[0].dims[0]
-    if held[0].dims != held[1].dims or len({*held[0].dims} - {"mode"}) != 1 or axis not in _RISING:
+    axis = pair[0].dims[0]
+    if pair[0].dims != pair[1].dims or len({*pair[0].dims} - {"mode"}) != 1 or axis not in _RISING:
         return None
     return axis if any((one != other).any() for one, other in _pairs(a, b, group, axis)) else None
 
@@ -236,28 +238,28 @@ def _pairs(a: StoredResult, b: StoredResult, group: str, name: str, _: str = "")
 def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis: str) -> Iterator[tuple[Any, Any]]:
     """A variable where the result with fewer rows in the common range has it; states are those of the nearest."""
 
-    def row(result: StoredResult, place: float) -> int:
+    def row(result: StoredResult, position: float) -> int:
         rows = range(result.variables(group)[axis].shape[0])
-        return bisect_left(rows, place, key=lambda row: float(result.read(group, axis, row, row + 1)[0]))
+        return bisect_left(rows, position, key=lambda row: float(result.read(group, axis, row, row + 1)[0]))
 
     ends = [[float(result.read(group, axis, *at)[0]) for at in ((0, 1), (-1, None))] for result in (a, b)]
     first = max(low for low, _ in ends)
     last = min(high for _, high in ends)
     parts = [range(row(result, first), row(result, math.nextafter(last, math.inf))) for result in (a, b)]
     swapped = len(parts[1]) < len(parts[0])
-    one, other, part = (b, a, parts[1]) if swapped else (a, b, parts[0])
-    for start in part[::BLOCK]:
-        stop = min(start + BLOCK, part.stop)
-        at, values = (one.read(group, each, start, stop) for each in (axis, name))
+    one, other, span = (b, a, parts[1]) if swapped else (a, b, parts[0])
+    for start in span[::BLOCK]:
+        stop = min(start + BLOCK, span.stop)
+        at, values = (one.read(group, variable, start, stop) for variable in (axis, name))
         near = max(row(other, at[0]) - 1, 0), row(other, at[-1]) + 1
-        places, there = (other.read(group, each, *near) for each in (axis, name))
+        places, there = (other.read(group, variable, *near) for variable in (axis, name))
         where = np.interp(at, places, np.arange(len(places)))
         low = np.floor(where).astype(int)
         high = np.ceil(where).astype(int)
         if there.dtype.kind == "f":
             weight = (where - low).reshape(-1, *[1] * (there.ndim - 1))
-            known = (there[low] != FILL) & (there[high] != FILL)
-            between = np.where(known, there[low] + weight * (there[high] - there[low]), FILL)
+            present = (there[low] != FILL) & (there[high] != FILL)
+            between = np.where(present, there[low] + weight * (there[high] - there[low]), FILL)
         else:
             between = there[np.round(where).astype(int)]
         yield (between, values) if swapped else (values, between)

@@ -51,7 +51,7 @@ _AXES = {
 }
 
 
-class Part(NamedTuple):
+class Excerpt(NamedTuple):
     """The part of a motion that is exported: both ends (s), and of how many samples one is kept."""
 
     start: float = -math.inf
@@ -59,7 +59,7 @@ class Part(NamedTuple):
     every: int = 1
 
 
-WHOLE = Part()
+WHOLE = Excerpt()
 
 
 def export(
@@ -67,7 +67,7 @@ def export(
     target: Path,
     group: str | None,
     names: Sequence[str],
-    part: Part = WHOLE,
+    excerpt: Excerpt = WHOLE,
     *,
     force: bool,
     tell: Callable[[str, int, int], None] = lambda what, done, total: None,
@@ -99,18 +99,18 @@ def export(
         remedy = f"give one {argument('variable')} and no other group"
         raise UsageError(f"{target}: a sound is one variable of the history; {remedy}")
     group = group or ("history" if kind == "run" else "/")
-    if part != WHOLE and _AXES.get(group, ("",))[0] != "time":
+    if excerpt != WHOLE and _AXES.get(group, ("",))[0] != "time":
         ends = ", ".join(map(argument, ("from", "to", "every")))
         raise UsageError(f"{ends}: are for what has a time, as the history of a run; leave them out")
-    if suffix == ".wav" and part.every > 1:
+    if suffix == ".wav" and excerpt.every > 1:
         raise UsageError(f"{argument('every')}: would bend the tones of a sound; leave it out")
     with new_output(target, force=force) as file:
         notes = list[str]()
         if suffix == ".wav":
-            sound, notes = _sound(result, names[0] if names else "vx", part)
+            sound, notes = _sound(result, names[0] if names else "vx", excerpt)
             file.write(sound)
         else:
-            for rows in _rows(result, group, names, part, tell):
+            for rows in _rows(result, group, names, excerpt, tell):
                 stream = io.StringIO()
                 csv.writer(stream, lineterminator="\n").writerows(rows)
                 file.write(stream.getvalue().encode())
@@ -119,46 +119,52 @@ def export(
 
 
 def _rows(
-    result: StoredResult, group: str, names: Sequence[str], wanted: Part, tell: Callable[[str, int, int], None]
+    result: StoredResult, group: str, names: Sequence[str], excerpt: Excerpt, tell: Callable[[str, int, int], None]
 ) -> Iterator[list[Sequence[Any]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
-    known = result.variables(group)
-    axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(known)
+    variables = result.variables(group)
+    axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(variables)
     if not axes:
         raise UnreadableResultError(f"{result.path}: holds no numbers along an axis; name another result")
-    shape = tuple(known[axis].shape[0] for axis in axes)
-    ordered = sorted(known, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
-    there = [name for name in ordered if known[name].dims != (name,) and _lies_along(known[name], axes, shape)]
-    chosen = {name: _kept(result, group, name, len(axes)) for name in _checked(names, there, result)}
-    header = [_head(axis, known[axis]) for axis in axes]
-    for name, kept in chosen.items():
-        inner = known[name].dims[len(axes) :]
-        header += [_head(f"{name} of {inner[0]} {number + 1}" if inner else name, known[name]) for number in kept]
+    shape = tuple(variables[axis].shape[0] for axis in axes)
+    ordered = sorted(variables, key=lambda name: _ORDER.index(name) if name in _ORDER else len(_ORDER))
+    there = [
+        name for name in ordered if variables[name].dims != (name,) and _lies_along(variables[name], axes, shape)
+    ]
+    chosen = {
+        name: _numbers_with_column(result, group, name, len(axes)) for name in _checked(names, there, result)
+    }
+    header = [_head(axis, variables[axis]) for axis in axes]
+    for name, numbers in chosen.items():
+        inner = variables[name].dims[len(axes) :]
+        header += [
+            _head(f"{name} of {inner[0]} {number + 1}" if inner else name, variables[name]) for number in numbers
+        ]
     yield [_cells(np.array(header))]
     places = [result.read(group, axis) for axis in axes]
-    first, last = _ends(places[0], wanted) if wanted != WHOLE else (0, shape[0])
-    every = wanted.every
+    first, last = _ends(places[0], excerpt) if excerpt != WHOLE else (0, shape[0])
+    every = excerpt.every
     rows = every * max(1, _BLOCK // math.prod(shape[1:]))
     for start in range(first, last, rows):
         stop = min(start + rows, last)
-        part = places[0][start:stop:every]
-        columns = [each.ravel() for each in np.meshgrid(part, *places[1:], indexing="ij")]
-        for name, kept in chosen.items():
-            if known[name].dims == axes[1:]:  # alike in both directions
-                values = np.broadcast_to(result.read(group, name), (len(part), *shape[1:]))
+        block = places[0][start:stop:every]
+        columns = [coordinates.ravel() for coordinates in np.meshgrid(block, *places[1:], indexing="ij")]
+        for name, numbers in chosen.items():
+            if variables[name].dims == axes[1:]:  # alike in both directions
+                values = np.broadcast_to(result.read(group, name), (len(block), *shape[1:]))
             else:
                 values = result.read(group, name, start, stop)[::every]
-            columns += [*values.reshape(len(columns[0]), -1).T[kept]]
+            columns += [*values.reshape(len(columns[0]), -1).T[numbers]]
         yield [*zip(*map(_cells, columns), strict=True)]
         tell("rows", stop - first, last - first)
 
 
-def _ends(time: NDArray[Any], wanted: Part) -> tuple[int, int]:
+def _ends(time: NDArray[Any], excerpt: Excerpt) -> tuple[int, int]:
     """The rows between two times, both included; raises UsageError where there are none."""
-    first = int(np.searchsorted(time, wanted.start, "left"))
-    last = int(np.searchsorted(time, wanted.end, "right"))
+    first = int(np.searchsorted(time, excerpt.start, "left"))
+    last = int(np.searchsorted(time, excerpt.end, "right"))
     if first >= last:
-        between = f"{argument('from')} {wanted.start:g}, {argument('to')} {wanted.end:g}"
+        between = f"{argument('from')} {excerpt.start:g}, {argument('to')} {excerpt.end:g}"
         there = f"those of the result reach from {time[0]:g} to {time[-1]:g} s" if len(time) else "there is none"
         raise UsageError(f"{between}: no time lies there; {there}")
     return first, last
@@ -179,7 +185,7 @@ def _lies_along(variable: Variable, axes: tuple[str, ...], shape: tuple[int, ...
     )
 
 
-def _kept(result: StoredResult, group: str, name: str, axes: int) -> list[int]:
+def _numbers_with_column(result: StoredResult, group: str, name: str, axes: int) -> list[int]:
     """Which values at a place have a column: of the windows of instability as many as the point with most has."""
     inner = result.variables(group)[name].shape[axes:]
     if not inner:
@@ -188,10 +194,10 @@ def _kept(result: StoredResult, group: str, name: str, axes: int) -> list[int]:
     return [number for number, column in enumerate(values.T) if column.dtype.kind != "f" or (column != FILL).any()]
 
 
-def _main(known: dict[str, Variable]) -> tuple[str, ...]:
+def _main(variables: dict[str, Variable]) -> tuple[str, ...]:
     """The axes that all numbers of a sweep, of stability or of a comparison have in common."""
-    dims = [each.dims for name, each in known.items() if each.dims != (name,)]
-    return known["status"].dims if "status" in known else min(dims, key=len, default=())
+    dims = [variable.dims for name, variable in variables.items() if variable.dims != (name,)]
+    return variables["status"].dims if "status" in variables else min(dims, key=len, default=())
 
 
 def _checked(names: Sequence[str], there: Sequence[str], result: StoredResult) -> Sequence[str]:
@@ -208,15 +214,15 @@ def _head(name: str, variable: Variable) -> str:
     return labelled(name, plain_units(str(variable.attributes.get("units", ""))))
 
 
-def _sound(result: StoredResult, name: str, part: Part) -> tuple[bytes, list[str]]:
+def _sound(result: StoredResult, name: str, excerpt: Excerpt) -> tuple[bytes, list[str]]:
     """A variable of a history as a WAV file of 16 bits, without its mean; what cannot be heard of it."""
     from scipy.io import wavfile
     from scipy.signal import resample_poly
 
-    known = result.variables("history")
-    _checked([name], [each for each in known if each not in ("time", "state")], result)
+    variables = result.variables("history")
+    _checked([name], [variable for variable in variables if variable not in ("time", "state")], result)
     time = result.read("history", "time")
-    first, last = _ends(time, part) if part != WHOLE else (0, len(time))
+    first, last = _ends(time, excerpt) if excerpt != WHOLE else (0, len(time))
     steps = np.diff(time[first:last])
     values = result.read("history", name, first, last) if len(steps) else np.zeros(0)
     if len(steps) and np.ptp(steps) > _UNEVEN * np.median(steps):

@@ -57,16 +57,16 @@ class Field:
     def read(self, report: object) -> Any:
         """The value that a report holds, as JSON and files hold it."""
         value: Any = report
-        for part in self._path:
+        for step in self._path:
             if value is not None:
-                value = value[part] if isinstance(value, dict) else getattr(value, part)
+                value = value[step] if isinstance(value, dict) else getattr(value, step)
                 value = value() if callable(value) else value
         if not self.rows and self.kind != "i8":
             value = plain(value)
         if value is None:
             return self.missing
         if self.rows and isinstance(value, list | tuple):
-            return [values_of(self.rows, each) for each in value]
+            return [values_of(self.rows, item) for item in value]
         if self.rows:
             return values_of(self.rows, value)
         return int(value) if self.kind == "i8" else value
@@ -105,19 +105,19 @@ def values_of(fields: Iterable[Field], report: object) -> dict[str, Any]:
 
 def named(fields: Iterable[Field], *names: str) -> tuple[Field, ...]:
     """The fields of these names, in this order."""
-    known = {field.name: field for field in fields}
-    return tuple(known[name] for name in names)
+    by_name = {field.name: field for field in fields}
+    return tuple(by_name[name] for name in names)
 
 
 def flat(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     """The keys of nested tables, and of lists of tables, by their paths as `axis[0].values`."""
     inner: Any = value.items() if isinstance(value, dict) else ()
     if isinstance(value, list) and value and isinstance(value[0], dict):
-        inner = ((f"[{place}]", each) for place, each in enumerate(value))
+        inner = ((f"[{index}]", item) for index, item in enumerate(value))
     if not inner:
         yield path, value
-    for key, each in inner:
-        yield from flat(each, path + key if key[0] == "[" else f"{path}.{key}".strip("."))
+    for key, item in inner:
+        yield from flat(item, path + key if key[0] == "[" else f"{path}.{key}".strip("."))
 
 
 def plain(value: Any) -> Any:
@@ -140,5 +140,5 @@ def plain(value: Any) -> Any:
     if is_dataclass(value):
         value = vars(value)
     if isinstance(value, Mapping):
-        return {name: plain(each) for name, each in value.items()}
-    return [plain(each) for each in value] if isinstance(value, list | tuple) else value
+        return {name: plain(item) for name, item in value.items()}
+    return [plain(item) for item in value] if isinstance(value, list | tuple) else value

@@ -264,7 +264,7 @@ DIFFERENCE = (integer("hysteresis", "whether the motions on the way up and down 
 STARTS = (integer("attractor", "number of the attractor that the point comes to, 0 if undecided"),)
 ATTRACTOR = (
     integer("attractor", "number of the attractor"),
-    *(replace(each, at="") for each in named(VERDICT, "regime", "excitation", "frequency")),
+    *(replace(field, at="") for field in named(VERDICT, "regime", "excitation", "frequency")),
     Field("amplitude", "m", "half of peak to peak of x; 0 in steady sliding", label="amplitude of x"),
     ratio("stick_fraction", "part of the time in stick"),
     ratio("contact_loss_fraction", "part of the time without contact"),

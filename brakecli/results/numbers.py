@@ -22,57 +22,59 @@ def stored_numbers(result: StoredResult) -> dict[str, Any]:
     """Names and values, None where there is none. Raises UnreadableResultError."""
     kind = str(result.attributes.get("kind"))
     declared = DECLARED.get(kind, ())
-    held = {name: plain(value) for name, value in result.attributes.items()}
+    attributes = {name: plain(value) for name, value in result.attributes.items()}
     there = result.groups
-    objects = {each.name: dict(result.group_attributes(each.group)) for each in declared if each.group in there}
-    found = {**dict.fromkeys(each.name for each in declared), **objects, **held}
+    objects = {
+        field.name: dict(result.group_attributes(field.group)) for field in declared if field.group in there
+    }
+    numbers = {**dict.fromkeys(field.name for field in declared), **objects, **attributes}
     if "vibrations" in there:
-        found["vibrations"] = rows(result, "vibrations", fields.VIBRATION)
+        numbers["vibrations"] = rows(result, "vibrations", fields.VIBRATION)
     if kind == "comparison":
-        found["entries"] = rows(result, "/", fields.ENTRY)
-        best = held.get("recommended")
-        found["recommended"] = None if best is None else found["entries"][best]
+        numbers["entries"] = rows(result, "/", fields.ENTRY)
+        best = attributes.get("recommended")
+        numbers["recommended"] = None if best is None else numbers["entries"][best]
     if kind == "stability":
         along = Field(result.variables("/")["frequencies"].dims[0], "", "")
-        known = (along, *stability_fields.VARIED, *stability_fields.MODES)
-        found["vary"] = [{**each, "value": each[along.name]} for each in rows(result, "/", known)]
+        columns = (along, *stability_fields.VARIED, *stability_fields.MODES)
+        numbers["vary"] = [{**row, "value": row[along.name]} for row in rows(result, "/", columns)]
     if kind == "branch":
         names = [name for name in there if name.startswith("branch_") and "/" not in name]
         names.sort(key=lambda name: int(name.removeprefix("branch_")))
-        found["branches"] = [_branch(result, name) for name in names]
+        numbers["branches"] = [_branch(result, name) for name in names]
     if kind == "scatter":
-        found |= _by_name(result, stability_fields.OUTCOME, stability_fields.PROBABILITY)
-        found |= _by_name(result, stability_fields.SCATTERING, stability_fields.INDEX)
-    return found
+        numbers |= _by_name(result, stability_fields.OUTCOME, stability_fields.PROBABILITY)
+        numbers |= _by_name(result, stability_fields.SCATTERING, stability_fields.INDEX)
+    return numbers
 
 
-def rows(result: StoredResult, group: str, known: Iterable[Field]) -> list[dict[str, Any]]:
+def rows(result: StoredResult, group: str, declared: Iterable[Field]) -> list[dict[str, Any]]:
     """The variables of a group, a record for each place along them; None stands for a number that is missing."""
     there = result.variables(group)
-    columns = {each.name: result.read(group, each.name) for each in known if each.name in there}
-    lists = {name: _known(values.tolist()) for name, values in columns.items()}
+    columns = {field.name: result.read(group, field.name) for field in declared if field.name in there}
+    lists = {name: _or_none(values.tolist()) for name, values in columns.items()}
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 
-def _known(value: Any) -> Any:
+def _or_none(value: Any) -> Any:
     if isinstance(value, list):
-        return [_known(each) for each in value]
+        return [_or_none(item) for item in value]
     return None if value == FILL else value
 
 
 def _branch(result: StoredResult, group: str) -> dict[str, Any]:
     """A branch: its motions, and its special points."""
-    points = [each for each in stability_fields.BRANCH_POINT if each.name != "multipliers"]
-    found: dict[str, Any] = {"note": ""}
-    found |= {name: plain(value) for name, value in result.group_attributes(group).items()}
-    found["points"] = rows(result, group, points)
-    found["special"] = rows(result, f"{group}/special", stability_fields.SPECIAL)
-    return found
+    points = [field for field in stability_fields.BRANCH_POINT if field.name != "multipliers"]
+    branch: dict[str, Any] = {"note": ""}
+    branch |= {name: plain(value) for name, value in result.group_attributes(group).items()}
+    branch["points"] = rows(result, group, points)
+    branch["special"] = rows(result, f"{group}/special", stability_fields.SPECIAL)
+    return branch
 
 
-def _by_name(result: StoredResult, names: Field, known: Iterable[Field]) -> dict[str, Any]:
+def _by_name(result: StoredResult, names: Field, declared: Iterable[Field]) -> dict[str, Any]:
     """Values by the texts along their axis; none where the file has no such axis."""
     if names.name not in result.variables("/"):
         return {}
-    held = rows(result, "/", (names, *known))
-    return {each.name: {row[names.name]: row.get(each.name) for row in held} for each in known}
+    records = rows(result, "/", (names, *declared))
+    return {field.name: {row[names.name]: row.get(field.name) for row in records} for field in declared}

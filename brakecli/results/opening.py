@@ -47,7 +47,7 @@ def is_hdf5(path: str | PathLike[str]) -> bool:
 def hdf5_begin(file: RawIOBase) -> int | None:
     """Where HDF5 begins in a file: behind a user block, if there is one; None where it does not."""
     size = file.seek(0, os.SEEK_END)
-    for place in (0, *(1 << power for power in range(9, size.bit_length()))):
-        if file.seek(place) == place and file.read(8) == SIGNATURE:
-            return place
+    for begin in (0, *(1 << power for power in range(9, size.bit_length()))):
+        if file.seek(begin) == begin and file.read(8) == SIGNATURE:
+            return begin
     return None

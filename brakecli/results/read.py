@@ -89,8 +89,8 @@ class StoredResult:
             return self._variables[group]
         with explained(self.path):
             nodes = self._node(group, h5py.Group, f"group {group}").items()
-            found = {name: _variable(name, node) for name, node in nodes if isinstance(node, h5py.Dataset)}
-        self._variables[group] = named = _Named(self.path, found)
+            variables = {name: _variable(name, node) for name, node in nodes if isinstance(node, h5py.Dataset)}
+        self._variables[group] = named = _Named(self.path, variables)
         return named
 
     def read(self, group: str, name: str, start: int = 0, stop: int | None = None) -> NDArray[Any]:
@@ -149,13 +149,13 @@ def groups_of(file: h5py.File) -> list[str]:
 
 def attributes_of(node: h5py.HLObject) -> dict[str, Any]:
     """Attributes as str, int, float, list of str, or array of numbers."""
-    found = {}
+    attributes = {}
     for name in node.attrs:
         if name not in _MACHINERY:
             value = node.attrs[name]
-            kept = isinstance(value, str) or (isinstance(value, np.ndarray) and value.dtype.kind in "iuf")
-            found[name] = value if kept else value.tolist()
-    return found
+            as_it_is = isinstance(value, str) or (isinstance(value, np.ndarray) and value.dtype.kind in "iuf")
+            attributes[name] = value if as_it_is else value.tolist()
+    return attributes
 
 
 def digest(file: RawIOBase, length: int) -> bytes:

@@ -160,35 +160,37 @@ class TextTable:
         """
         name = self.names[column] if self.names else ""
         end = name.rpartition("_")[2] if "_" in name else ""
-        given = [*self.units[column : column + 1], *re.findall(r"[(\[]([^()\[\]]+)[)\]]", name)[-1:]]
-        given += (  # the end of `force_x` or `height_a` need not be a unit, nor a name like `h`
+        texts = [*self.units[column : column + 1], *re.findall(r"[(\[]([^()\[\]]+)[)\]]", name)[-1:]]
+        texts += (  # the end of `force_x` or `height_a` need not be a unit, nor a name like `h`
             text
             for text in (end, name)
             if (size := si(text)) and (size[1] in wanted or (text == end and (len(text) > 1 or text in "NV")))
         )
-        known = {text.strip(): si(text.strip()) for text in given if text.strip() not in ("", "-", "1")}
-        for text, base in known.items():
+        sizes = {text.strip(): si(text.strip()) for text in texts if text.strip() not in ("", "-", "1")}
+        for text, base in sizes.items():
             require(base, f"column {name}: there is no unit {printable(text)}; give one as in mm, um or m/s^2")
             if base and base[1] not in wanted:
                 what = f"column {name}: {printable(text)} is {base[1]}, not {' or '.join(wanted)}"
                 raise UnreadableResultError(f"{what}; correct the unit, or name the column otherwise")
-        require(len({*known.values()}) < 2, f"column {name}: has the units {' and '.join(known)}; keep one")
-        return next(iter(known.values()), None)
+        require(len({*sizes.values()}) < 2, f"column {name}: has the units {' and '.join(sizes)}; keep one")
+        return next(iter(sizes.values()), None)
 
     def _read(self, columns: list[int]) -> list[Array]:
         """Some columns; every row is as long as the first one, and each cell holds a number, nothing or nan."""
         rows = self._rows(self._lines())
         line = self.skip
-        parts = [list[Array]() for _ in columns]
+        columns_of_blocks = [list[Array]() for _ in columns]
         while some := list(islice(rows, _AT_ONCE)):
             places: Sequence[int] = range(line + 1, line + 1 + len(some))
             line += len(some)
             if {*map(len, some)} != {self.columns} or self.columns == 1:
-                places = [place for place, row in zip(places, some, strict=True) if not self._is_blank(row, place)]
-                some = [some[place - line - 1] for place in places]  # from behind
-            for part, column in zip(parts, columns, strict=True):
-                part.append(self._column([row[column] for row in some], column, places))
-        return [np.concatenate(part) for part in parts]
+                places = [
+                    number for number, row in zip(places, some, strict=True) if not self._is_blank(row, number)
+                ]
+                some = [some[number - line - 1] for number in places]  # from behind
+            for blocks, column in zip(columns_of_blocks, columns, strict=True):
+                blocks.append(self._column([row[column] for row in some], column, places))
+        return [np.concatenate(blocks) for blocks in columns_of_blocks]
 
     def _is_blank(self, row: list[str], line: int) -> bool:
         """Whether a row is an empty line; raises UnreadableResultError for one that is shorter or longer."""

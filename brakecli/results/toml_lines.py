@@ -71,7 +71,7 @@ def split(text: str, source: str = "") -> list[tuple[int, str]]:
     """
     check_size(text, source, LARGEST_STORED)
     text = text.replace("\r\n", "\n")
-    bare = _OPAQUE.sub(lambda found: (" " if found[0][0] == "#" else "_") * len(found[0]), text)
+    bare = _OPAQUE.sub(lambda opaque: (" " if opaque[0][0] == "#" else "_") * len(opaque[0]), text)
     for searched, pattern, what, remedy in (
         (text, r"\A\ufeff", "begins with a byte order mark", "save the file as UTF-8 without one"),
         (text, r"\0", "holds a NUL character", "save the file as UTF-8 text, not as UTF-16"),
@@ -182,14 +182,14 @@ def parse(text: str, source: str = "", line: int = 1) -> dict[str, Any]:
     except (ValueError, OverflowError) as error:
         # Beside its own error, tomllib lets through those of int() (too many digits) and of dates.
         message = str(error)
-        place = 0
+        below = 0
         if position := _POSITION.search(message):
             message = message[: position.start()]
-            place = int(position[1] or 1) - 1
-        shown = printable(text.split("\n")[place].strip())
+            below = int(position[1] or 1) - 1
+        shown = printable(text.split("\n")[below].strip())
         raise unfit(
             f"is not valid TOML: {message[0].lower()}{message[1:]}" + (f" (found {shown})" if shown else ""),
             WRITING,
             source,
-            line + place,
+            line + below,
         ) from None

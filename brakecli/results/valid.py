@@ -51,7 +51,7 @@ _VARIABLES = {  # the first of a kind has the length of all
     ("scatter", "/"): (stability_fields.SAMPLE, *stability_fields.SCATTERED),
     ("branch", "branch_*/special"): stability_fields.SPECIAL,
 }
-_OBJECTS = {each.group: each for each in fields.RUN if each.group}  # whose items are attributes of a group
+_OBJECTS = {field.group: field for field in fields.RUN if field.group}  # whose items are attributes of a group
 _BRIEFEST = 1e-120  # between two numbers of an axis: beyond what the smallest and largest of a case make
 
 
@@ -71,7 +71,7 @@ def check_result(file: h5py.File) -> None:
 
 def declared_attributes(kind: str, group: str) -> dict[str, Field]:
     """The attributes that a group of a result of this kind may have, by name."""
-    declared = [each for each in _ATTRIBUTES.get((kind, _every(group)), ()) if each.in_file]
+    declared = [field for field in _ATTRIBUTES.get((kind, _every(group)), ()) if field.in_file]
     return {field.name: field for field in (*declared, *_ROOT * (group == "/"))}
 
 
@@ -87,15 +87,17 @@ def _every(group: str) -> str:
     return re.sub(r"^branch_\d+", "branch_*", group)
 
 
-def _check_attributes(given: Mapping[str, Any], kind: str, group: str) -> None:
-    known = declared_attributes(kind, group)
+def _check_attributes(attributes: Mapping[str, Any], kind: str, group: str) -> None:
+    declared = declared_attributes(kind, group)
     if kind == "run" and (item := _OBJECTS.get(group)):  # of numbers; evidence also has lists and words
-        free = {name for name, value in given.items() if isinstance(value, str) or np.ndim(value) == 1}
-        known = {
-            name: Field(name, "", item.meaning) for name in given if item.name != "evidence" or name not in free
+        free = {name for name, value in attributes.items() if isinstance(value, str) or np.ndim(value) == 1}
+        declared = {
+            name: Field(name, "", item.meaning)
+            for name in attributes
+            if item.name != "evidence" or name not in free
         }
-    for name, field in known.items():
-        if name in given and not _fits(field, given[name]):
+    for name, field in declared.items():
+        if name in attributes and not _fits(field, attributes[name]):
             raise ValueError(f"attribute {name} is not what belongs there: {field.meaning}")
 
 
@@ -131,4 +133,4 @@ def _fits(field: Field, value: Any) -> bool:
         return isinstance(value, str)
     if field.units:
         return isinstance(value, np.ndarray)
-    return isinstance(value, list) and all(isinstance(each, str) for each in value)
+    return isinstance(value, list) and all(isinstance(item, str) for item in value)
