@@ -43,7 +43,7 @@ class Problem:
 
     def __str__(self) -> str:
         """`FILE:LINE: key.path: what is wrong (found VALUE); remedy`."""
-        return ": ".join(part for part in (self.where, self.key, f"{self.what}; {self.remedy}") if part)
+        return ": ".join(text for text in (self.where, self.key, f"{self.what}; {self.remedy}") if text)
 
 
 class BrakecliError(Exception):
@@ -57,7 +57,7 @@ class BrakecliError(Exception):
 
     def __str__(self) -> str:
         """The sentences, a line each, without what a terminal would take for a command."""
-        return escaped(super().__str__(), kept="\n")
+        return escaped(super().__str__(), allowed="\n")
 
 
 class UsageError(BrakecliError, exit_code=2):
@@ -102,16 +102,16 @@ def installed(*packages: str) -> Iterator[None]:
 def key_text(path: KeyPath) -> str:
     """A key path as TOML writes it, with places in a list in brackets: `roughness.wheel.amplitudes[2]`."""
     text = ""
-    for part in path:
-        if isinstance(part, str):
-            is_bare = re.fullmatch(r"[\w-]+", part, re.ASCII)
-            text += "." + (part if is_bare else json.dumps(part, ensure_ascii=False))
+    for step in path:
+        if isinstance(step, str):
+            is_bare = re.fullmatch(r"[\w-]+", step, re.ASCII)
+            text += "." + (step if is_bare else json.dumps(step, ensure_ascii=False))
         else:
-            text += f"[{part}]"
+            text += f"[{step}]"
     return printable(text.removeprefix("."))
 
 
-def found(value: object) -> str:
+def found_text(value: object) -> str:
     """The part of a message that shows the value which was found."""
     return f" (found {value_text(value)})"
 
@@ -128,7 +128,7 @@ def value_text(value: object) -> str:
         case dict():
             text = "a table"
         case list() | tuple():
-            shown = ["[…]" if isinstance(each, list) else value_text(each) for each in value[:_SHOWN]]
+            shown = ["[…]" if isinstance(item, list) else value_text(item) for item in value[:_SHOWN]]
             text = f"[{', '.join([*shown, '…'] if len(value) > _SHOWN else shown)}]"
         case _:
             text = str(value)
@@ -140,9 +140,9 @@ def printable(text: str) -> str:
     return escaped(text if len(text) <= _LONGEST else text[: _LONGEST - 1] + "…")
 
 
-def escaped(text: str, kept: str = "") -> str:
+def escaped(text: str, allowed: str = "") -> str:
     """A text for a terminal: control characters, and those that turn its direction, are written as in JSON."""
     if text.isprintable():
         return text
-    odd = {char for char in text if unicodedata.category(char) in _ODD and char not in kept}
+    odd = {char for char in text if unicodedata.category(char) in _ODD and char not in allowed}
     return text.translate({ord(char): json.dumps(char)[1:-1] for char in odd})

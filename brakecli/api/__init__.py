@@ -5,7 +5,7 @@ and signatures of these. `commands` computes what a command is asked, by its rec
 returns it.
 
 `cases`, `many` and `results` are the functions of `import brakecli`, which return xarray objects; `calls` is
-what is around each of them. `given` reads what options hold, `inputs` files, `measured` how a signal was
+what is around each of them. `values` reads what options hold, `inputs` files, `measured` how a signal was
 measured, `verdict` says what a file shows, and `progress` how far long work has come.
 
 `cli` is above: one file for each command, which prints.

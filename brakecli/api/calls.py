@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brakecli.errors import UsageError, found
+from brakecli.errors import UsageError, found_text
 from brakecli.faces import in_python
 from brakecli.stop import signals_shown
 
@@ -73,7 +73,7 @@ def target(output: "str | PathLike[str] | None", name: str = "result.h5") -> Ite
     """Where a result goes: to a file that stays, or to one that does not."""
     if output is not None:
         if not isinstance(output, str | PathLike):
-            raise UsageError(f"output: is no path{found(output)}; give one, or leave it out")
+            raise UsageError(f"output: is no path{found_text(output)}; give one, or leave it out")
         yield Path(output)
         return
     with tempfile.TemporaryDirectory(prefix="brakecli-") as folder:

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 from brakecli.api import commands
 from brakecli.api.calls import as_files, called, target, telling_to, warn
 from brakecli.api.commands import slips_in
-from brakecli.api.given import case_of, ends_of
 from brakecli.api.options import takes
 from brakecli.api.records import Advise, Branch, Run, Stability
+from brakecli.api.values import case_of, ends_of
 from brakecli.errors import BrakecliError, UsageError
 
 if TYPE_CHECKING:
@@ -74,11 +74,11 @@ def stability(options: Stability) -> "xr.Dataset":
             return dataset((*STABILITY, *THRESHOLDS), commands.stability_of(loaded, tell, options.pushes))
         from brakecli.studies.sweeps.lock_in import write
 
-        found = commands.modes_along(loaded, options.vary, tell)
+        diagram = commands.modes_along(loaded, options.vary, tell)
         if options.output is not None:
-            write(Path(options.output), loaded, found, force=options.force)
+            write(Path(options.output), loaded, diagram, force=options.force)
         with target(None) as path:
-            write(path, loaded, found, force=False)
+            write(path, loaded, diagram, force=False)
             return opened(path).to_dataset()
 
 

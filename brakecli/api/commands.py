@@ -7,7 +7,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.api.given import (
+from brakecli.api.measured import look_at, quantity_of
+from brakecli.api.values import (
     axis_of,
     chosen_of,
     ends_of,
@@ -19,7 +20,6 @@ from brakecli.api.given import (
     sweep_of_options,
     text_of,
 )
-from brakecli.api.measured import look_at, quantity_of
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 
@@ -66,8 +66,8 @@ def stability_of(loaded: LoadedCase, tell: Counted, pushes: int | None) -> dict[
         report = stability(system)
         numbers = values_of(STABILITY, report)
         if pushes is not None:
-            found = thresholds(loaded.case, system, report, tell, pushes_of(pushes))
-            numbers |= values_of(THRESHOLDS, found)
+            limits = thresholds(loaded.case, system, report, tell, pushes_of(pushes))
+            numbers |= values_of(THRESHOLDS, limits)
     return numbers
 
 
@@ -203,9 +203,9 @@ def diff(options: Diff, first: Path, second: Path, target: Path | None) -> Diffe
 
     variable = text_of(options.variable, "variable")
     with open_result(first) as a, open_result(second) as b:
-        found = difference(a, b)
+        differences = difference(a, b)
     if target is not None:
         from brakecli.views.plots.result import plot_two
 
         plot_two(first, second, target, force=options.force, variable=variable)
-    return found
+    return differences

@@ -43,7 +43,7 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     from brakecli.results.read import open_result
 
     with open_result(Path(source), kind="run") as result:
-        given = result.text("case_toml")
+        case_toml = result.text("case_toml")
         resolved = result.text("resolved_toml")
     label = f"{source} (its resolved case)"
     try:
@@ -51,7 +51,7 @@ def load_case(source: str, overrides: list[str] | None) -> "LoadedCase":
     except CaseError as error:
         what = f"{source}: the case in it is not valid: {error.problems[0]}"
         raise UnreadableResultError(f"{what}; name an intact result file") from error
-    return replace(parse_resolved(resolved, label, overrides or ()), text=given)
+    return replace(parse_resolved(resolved, label, overrides or ()), text=case_toml)
 
 
 def load_sweep(source: str, overrides: list[str] | None) -> "LoadedSweep":

@@ -5,9 +5,9 @@ from typing import TYPE_CHECKING
 
 from brakecli.api import commands
 from brakecli.api.calls import called, target, telling_to, warn
-from brakecli.api.given import refuse_jobs
 from brakecli.api.options import takes
 from brakecli.api.records import Scatter, Sweep
+from brakecli.api.values import refuse_jobs
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -35,13 +35,13 @@ def sweep(options: Sweep) -> "xr.Dataset":
         report = commands.sweep(options, path, tell, in_caller=True)
         warn(report.notes)
         warn(report.findings.warnings)
-        if found := report.findings.failures:
+        if failures := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
-            warn([f"{failed}, the first: {found[0]['reason']}"])
+            warn([f"{failed}, the first: {failures[0]['reason']}"])
         result = opened(path).to_dataset()  # without groups
         if report.findings.attractors is not None:
-            known = [values_of(fields.ATTRACTOR, each) for each in report.findings.attractors]
-            result.attrs["attractors"] = json.dumps(known)
+            attractors = [values_of(fields.ATTRACTOR, attractor) for attractor in report.findings.attractors]
+            result.attrs["attractors"] = json.dumps(attractors)
         return result
 
 

@@ -6,8 +6,8 @@ from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from brakecli.api.given import plain, text_of
 from brakecli.api.records import Classify, Plot, Signal
+from brakecli.api.values import plain, text_of
 from brakecli.errors import UsageError, printable
 from brakecli.faces import argument
 

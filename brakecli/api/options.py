@@ -33,7 +33,7 @@ class Description:
 def described(record: Any) -> dict[str, Description]:
     """What is said of each field of a record, by its name, in the order of its signature."""
     parameters = inspect.signature(record).parameters.items()
-    return {name: each.annotation.__metadata__[0] for name, each in parameters}
+    return {name: parameter.annotation.__metadata__[0] for name, parameter in parameters}
 
 
 def takes(record: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Answer]], Callable[_P, _Answer]]:
@@ -54,7 +54,10 @@ def takes(record: Callable[_P, _Options]) -> Callable[[Callable[[_Options], _Ans
 def signature(record: Any, function: Callable[..., Any]) -> inspect.Signature:
     """The fields of a record as parameters, and what a function returns."""
     own = inspect.signature(record)
-    parameters = [each.replace(annotation=_type(each.annotation.__origin__)) for each in own.parameters.values()]
+    parameters = [
+        parameter.replace(annotation=_type(parameter.annotation.__origin__))
+        for parameter in own.parameters.values()
+    ]
     return own.replace(parameters=parameters, return_annotation=inspect.signature(function).return_annotation)
 
 

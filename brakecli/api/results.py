@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from brakecli.api import commands
 from brakecli.api.calls import as_files, called, target, telling_to, warn
-from brakecli.api.given import overrides, path_of
 from brakecli.api.options import docstring, takes
 from brakecli.api.records import Classify, Diff, Plot, Report
+from brakecli.api.values import overrides, path_of
 from brakecli.errors import UsageError
 
 if TYPE_CHECKING:
@@ -149,5 +149,5 @@ def diff(options: Diff) -> "Differences":
     ):
         from brakecli.views.accessor import Differences
 
-        found = commands.diff(options, files[0], files[1], None if options.output is None else path)
-        return Differences(**vars(found))
+        differences = commands.diff(options, files[0], files[1], None if options.output is None else path)
+        return Differences(**vars(differences))

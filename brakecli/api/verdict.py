@@ -7,9 +7,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from brakecli.api.given import chosen_of
 from brakecli.api.measured import look_at, quantity_of
 from brakecli.api.records import Classify
+from brakecli.api.values import chosen_of
 from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 from brakecli.faces import argument
 
@@ -29,8 +29,8 @@ def verdict_on(source: str, options: Classify) -> dict[str, Any]:
         return _on_result(source, thresholds)
     from brakecli.analysis.signals.table import SignalThresholds
 
-    found = look_at(options, source, changed(SignalThresholds, thresholds)).verdict
-    numbers = {**dataclasses.asdict(found), "bursts": [tone.numbers() for tone in found.bursts]}
+    verdict = look_at(options, source, changed(SignalThresholds, thresholds)).verdict
+    numbers = {**dataclasses.asdict(verdict), "bursts": [tone.numbers() for tone in verdict.bursts]}
     return {**numbers, "quantity": quantity}
 
 
@@ -52,7 +52,7 @@ def _on_result(source: str, thresholds: list[str] | None) -> dict[str, Any]:
 def changed(thresholds: type[Any], changes: list[str] | None) -> Any:
     """Thresholds with the values of NAME=VALUE; raises UsageError for what is not one of them."""
     names = [field.name for field in dataclasses.fields(thresholds)]
-    found: dict[str, float] = {}
+    values: dict[str, float] = {}
     for change in changes or ():
         name, _, text = change.partition("=")
         if name in _GONE and thresholds.__name__ == "Thresholds":
@@ -63,11 +63,11 @@ def changed(thresholds: type[Any], changes: list[str] | None) -> Any:
             nearest = difflib.get_close_matches(name, names, 1)
             remedy = f"did you mean {nearest[0]}?" if nearest else f"give one of {', '.join(names)}"
             raise UsageError(f"{argument('threshold')} {change}: there is no threshold {name}; {remedy}")
-        found[name] = math.nan
+        values[name] = math.nan
         with suppress(ValueError):
-            found[name] = float(text)
-        if not 0.0 <= found[name] < math.inf:
+            values[name] = float(text)
+        if not 0.0 <= values[name] < math.inf:
             raise UsageError(
                 f"{argument('threshold')} {change}: is not a number of at least 0; write {name}=NUMBER"
             )
-    return thresholds(**found)
+    return thresholds(**values)

@@ -60,28 +60,28 @@ class Case(Table):
 
     def _fill(self) -> None:
         if "sample_interval" not in self.output.model_fields_set and self.solver.step is not None:
-            given = self.output.model_dump(exclude_unset=True)
-            self.__dict__["output"] = Output(**given, sample_interval=self.solver.step)
+            keys = self.output.model_dump(exclude_unset=True)
+            self.__dict__["output"] = Output(**keys, sample_interval=self.solver.step)
 
     def _put_sines(self) -> Iterator[Problem]:
         """Put sines beside measured profiles; yield a problem for each that cannot be used.
 
         A surface with a profile counts as given by it alone, so that other settings may lead to other sines.
         """
-        for side, given in self.roughness:
-            if given is None or given.profile is None or given.amplitudes is not None:
+        for side, surface in self.roughness:
+            if surface is None or surface.profile is None or surface.amplitudes is not None:
                 continue
             from brakecli.case.profile import sines_of
 
             pad = self.contact.half_length if side == "shoe" else None
-            error = PROFILE_ERROR if given.profile_error is None else given.profile_error
+            error = PROFILE_ERROR if surface.profile_error is None else surface.profile_error
             try:
-                path = Path(given.profile)
-                record = record_of(given.profile)
-                sines = dict(type(given)(**sines_of(path.name, record, error, self.wheel.radius, pad)))
-                written = {"profile": str(path.absolute()), "profile_error": given.profile_error}
-                surface = given.model_construct(given.model_fields_set, **sines | written)
-                self.__dict__["roughness"] = self.roughness.model_copy(update={side: surface})
+                path = Path(surface.profile)
+                record = record_of(surface.profile)
+                sines = dict(type(surface)(**sines_of(path.name, record, error, self.wheel.radius, pad)))
+                written = {"profile": str(path.absolute()), "profile_error": surface.profile_error}
+                of_sines = surface.model_construct(surface.model_fields_set, **sines | written)
+                self.__dict__["roughness"] = self.roughness.model_copy(update={side: of_sines})
             except (OSError, ValueError) as failure:  # ValueError: a NUL in the path
                 what = f"cannot be read: {(getattr(failure, 'strerror', None) or str(failure)).lower()}"
                 yield self.wrong(f"roughness.{side}.profile", what, "name a CSV file")
@@ -114,7 +114,7 @@ class Case(Table):
         start = self.initial
         rough = [name for name, profile in self.roughness if profile and profile.is_rough]
         values = {"wheel.angular_speeds": self.wheel.angular_speeds, "load.forces": self.load.forces}
-        changing = [key for key, each in values.items() if len({*(each or ())}) > 1]
+        changing = [key for key, series in values.items() if len({*(series or ())}) > 1]
         yield from self.broken(
             (
                 step is not None and self.output.sample_interval < step * (1 - ROUNDED),
@@ -156,9 +156,9 @@ class Case(Table):
         )
         if step is None and "sample_interval" not in self.output.model_fields_set:
             # as one that is not given: it follows the case, also where that is changed
-            given = self.output.model_fields_set
-            found = {"sample_interval": self._interval()}
-            self.__dict__["output"] = Output.model_construct(given, **self.output.model_dump() | found)
+            set_keys = self.output.model_fields_set
+            interval = {"sample_interval": self._interval()}
+            self.__dict__["output"] = Output.model_construct(set_keys, **self.output.model_dump() | interval)
 
     def _interval(self) -> float:
         """Between samples (s), to two digits, by the fastest motion and the shortest wave that passes."""
@@ -209,8 +209,8 @@ def resolved_toml(case: Case) -> str:
 
 def given_toml(case: Case, *, profiles: bool = True) -> str:
     """The keys that were given, as TOML; without `profiles` their sines."""
-    given = case.model_dump(mode="json", exclude_unset=True, exclude_none=True)
-    return _as_toml(case, given, () if profiles else ("profile",))
+    keys = case.model_dump(mode="json", exclude_unset=True, exclude_none=True)
+    return _as_toml(case, keys, () if profiles else ("profile",))
 
 
 def _as_toml(case: Case, data: dict[str, Any], as_sines: tuple[str, ...]) -> str:

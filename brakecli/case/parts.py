@@ -8,7 +8,7 @@ from pydantic import ConfigDict, Field, TypeAdapter, WrapValidator, create_model
 
 from brakecli.case import tables
 from brakecli.case.tables import NonNegative, Number, Positive, Schedule, Table, described, one_of, quantity
-from brakecli.errors import Problem, found
+from brakecli.errors import Problem, found_text
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST_EVALUATIONS
 from brakecli.solver.schemes import SCHEMES, Scheme
@@ -52,7 +52,7 @@ class Varying(Table):
         for index in late[: tables.MOST_WRONG_ENTRIES]:
             yield Problem(
                 (times_key, index),
-                f"is not later than the time before it{found(times[index])}",
+                f"is not later than the time before it{found_text(times[index])}",
                 "let the times increase",
             )
 
@@ -208,7 +208,7 @@ class Solver(Table):
         elif row.sum_is_one and abs(sum(self.theta) - 1) > tables.ROUNDED:
             yield self.wrong("theta", f"adds up to {sum(self.theta):.12g}", "let the weights add up to 1")
         if self.start not in row.starts:
-            names = [name for name, each in SCHEMES.items() if self.start in each.starts]
+            names = [name for name, scheme in SCHEMES.items() if self.start in scheme.starts]
             what = f"is only for the {' and '.join(names)} scheme"
             remedy = " or ".join(f'"{name}"' for name in names)
             yield self.wrong("start", what, f"leave start out, or set scheme to {remedy}")

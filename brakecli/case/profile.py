@@ -31,48 +31,48 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
     wheel, of which whole turns are averaged. Otherwise the profile is repeated beyond what was measured. Raises
     UnreadableResultError and UsageError.
     """
-    place = np.frombuffer(record.place)
+    places = np.frombuffer(record.place)
     height = np.frombuffer(record.height)
-    place = place * radius if record.is_angle else place
+    places = places * radius if record.is_angle else places
     turn = 2.0 * math.pi * radius
-    step = float(np.median(np.diff(place)))
+    step = float(np.median(np.diff(places)))
     apart = f"its places lie {step:.3g} m apart, as a rule"
     require(step >= _NEAREST, f"{apart}; check their unit")
-    far = float(place[-1] - place[0])
+    far = float(places[-1] - places[0])
     require(far <= _FARTHEST, f"its places reach over {far:.3g} m; check their unit")
-    turns, around = _turns(place, step, turn) if pad is None else (0, 0.0)
+    turns, around = _turns(places, step, turn) if pad is None else (0, 0.0)
     if turns:
-        count = min(round(around / step), _MOST_PLACES * len(place) // turns)
+        count = min(round(around / step), _MOST_PLACES * len(places) // turns)
         few = f"{apart}, {count} in a turn of {turn:.3g} m; check their unit, or measure {_FEWEST} or more"
         require(count >= _FEWEST, few)
-        inside = place - place[0] < turns * around - 0.5 * step  # the last value may repeat the first
+        inside = places - places[0] < turns * around - 0.5 * step  # the last value may repeat the first
         grid = np.arange(turns * count) * (around / count)
-        rows = np.interp(grid, (place - place[0])[inside], height[inside], period=turns * around)
+        rows = np.interp(grid, (places - places[0])[inside], height[inside], period=turns * around)
         rows = rows.reshape(turns, count)
         stretched = 100.0 * (turn / around - 1.0)
-        found = rows.mean(axis=0) - rows.mean()
+        profile = rows.mean(axis=0) - rows.mean()
         spread = float(np.sqrt(np.mean((rows - rows.mean(axis=0)) ** 2)))
         how = f", mean of {turns} turns, which differ from it by {spread:.3g} m (RMS)" * (turns > 1)
         how += f"; the record was stretched by {stretched:.2g} % to whole turns" * (abs(stretched) > _SEEN)
         length = turn
     else:
-        span = float(place[-1] - place[0])
-        count = min(round(span / step) + 1, _MOST_PLACES * len(place))
+        span = float(places[-1] - places[0])
+        count = min(round(span / step) + 1, _MOST_PLACES * len(places))
         grid = np.linspace(0.0, span, count)
-        found = np.interp(grid, place - place[0], height)
-        found -= np.polyval(np.polyfit(grid, found, 1), grid)
+        profile = np.interp(grid, places - places[0], height)
+        profile -= np.polyval(np.polyfit(grid, profile, 1), grid)
         length = span * count / (count - 1)
         how = f", over {length:.4g} m, beyond which it repeats; a straight line was removed"
-        if pad is not None and (place[0] > -pad + step or place[-1] < pad - step):
-            how += f"; the pad from {-pad:g} to {pad:g} m reaches beyond {place[0]:.4g} to {place[-1]:.4g} m"
-    widest = float(np.diff(place).max())
+        if pad is not None and (places[0] > -pad + step or places[-1] < pad - step):
+            how += f"; the pad from {-pad:g} to {pad:g} m reaches beyond {places[0]:.4g} to {places[-1]:.4g} m"
+    widest = float(np.diff(places).max())
     how += f"; a straight line bridges a gap of {widest:.3g} m" * (widest > _GAP * step)
-    rms = float(np.sqrt(np.mean(found**2)))
+    rms = float(np.sqrt(np.mean(profile**2)))
     straight = "its heights lie on a straight line, which is removed; leave the surface out, which is smooth"
     require(rms > _ROUNDING * float(np.abs(height).max()), straight)
     require(rms < radius, f"its heights have an RMS of {rms:.3g} m, beyond the wheel's radius; check their unit")
-    chosen, amplitudes, phases, lost = _strongest(found, error)
-    phases = (phases - 360.0 * (chosen * place[0] / length % 1.0)) % 360.0
+    chosen, amplitudes, phases, lost = _strongest(profile, error)
+    phases = (phases - 360.0 * (chosen * places[0] / length % 1.0)) % 360.0
     note = f"{len(chosen)} of {count // 2} sines leave out {100.0 * lost:.3g} % of the RMS of {rms:.3g} m{how}"
     waves = {"orders": chosen.astype(float).tolist()} if turns else {"wavelengths": (length / chosen).tolist()}
     note = f"{printable(name)}: {note}"
@@ -94,11 +94,11 @@ def read(path: Path) -> Record:
     require(not bare, f"column {table.names[0] if bare else ''}: has no unit; name it angle_deg or angle_rad")
     sizes = (unit[0] if unit else 1.0 for unit in (along, up))
     with np.errstate(over="ignore"):
-        place, height = (values * size for values, size in zip(table.numbers(), sizes, strict=True))
-    return _checked(place, height, is_angle=bool(along and along[1] == "radian"))
+        places, height = (values * size for values, size in zip(table.numbers(), sizes, strict=True))
+    return _checked(places, height, is_angle=bool(along and along[1] == "radian"))
 
 
-def given(value: object) -> str:
+def keep_array(value: object) -> str:
     """The name, among the `arrays`, of a profile: an array of places and heights (m), as two columns.
 
     Raises UnreadableResultError.
@@ -119,28 +119,28 @@ def given(value: object) -> str:
     return name
 
 
-def _checked(place: Array, height: Array, *, is_angle: bool) -> Record:
+def _checked(places: Array, height: Array, *, is_angle: bool) -> Record:
     """The profile of rising or falling places; raises UnreadableResultError."""
-    require(len(place) > 3, f"has {len(place)} rows; measure four places or more")
-    require(np.isfinite(place).all() and np.isfinite(height).all(), "a cell is empty or no number; fill it")
-    for what, largest in (("place", np.abs(place).max()), ("height", np.abs(height).max())):
+    require(len(places) > 3, f"has {len(places)} rows; measure four places or more")
+    require(np.isfinite(places).all() and np.isfinite(height).all(), "a cell is empty or no number; fill it")
+    for what, largest in (("place", np.abs(places).max()), ("height", np.abs(height).max())):
         require(largest <= _FARTHEST, f"a {what} is {largest:.3g} in SI units; check the unit")
-    if place[-1] < place[0]:
-        place = place[::-1]
+    if places[-1] < places[0]:
+        places = places[::-1]
         height = height[::-1]
-    steps = np.diff(place)
+    steps = np.diff(places)
     row = int(np.argmin(steps > 0.0)) + 2
     back = f"its places do not rise or fall throughout, see row {row} of numbers; sort the rows"
     require(steps.min() > 0.0, back)
     high = float(np.ptp(height))
     require(high > 0.0, "all heights are equal; leave the surface out, which is smooth")
     require(high >= _FLATTEST, f"its heights differ by {high:.3g} m; check their unit")
-    return Record(place.tobytes(), height.tobytes(), is_angle)
+    return Record(places.tobytes(), height.tobytes(), is_angle)
 
 
-def _turns(place: Array, step: float, turn: float) -> tuple[int, float]:
+def _turns(places: Array, step: float, turn: float) -> tuple[int, float]:
     """Whole turns in a record, and the length of each; a record that nearly is so many turns has their length."""
-    span = float(place[-1] - place[0])
+    span = float(places[-1] - places[0])
     turns = math.floor((span + step) / turn + _FITS)
     # The end may repeat the start.
     length = min((span + step, span), key=lambda length: abs(length - turns * turn))
@@ -158,12 +158,12 @@ def _strongest(height: Array, error: float) -> tuple[Array, Array, Array, float]
     twice = np.where(np.arange(1, len(waves) + 1) == 0.5 * count, 1.0, 2.0)  # the shortest wave stands alone
     power = twice * np.abs(waves) ** 2  # Parseval: these add up to the mean square
     order = np.argsort(-power, kind="stable")
-    left = np.append(np.cumsum(power[order][::-1])[::-1], 0.0)
-    left = np.sqrt(left / left[0])
-    needed = int(np.argmax(left <= max(error, _ROUNDING)))
+    without = np.append(np.cumsum(power[order][::-1])[::-1], 0.0)
+    without = np.sqrt(without / without[0])
+    needed = int(np.argmax(without <= max(error, _ROUNDING)))
     if needed > MOST_SINES:
         what = f"needs {needed} sines to leave out {error:g} of its RMS, and {MOST_SINES} is the most"
-        raise UsageError(f"{what}; set profile_error to {math.ceil(1e3 * left[MOST_SINES]) / 1e3:g}")
+        raise UsageError(f"{what}; set profile_error to {math.ceil(1e3 * without[MOST_SINES]) / 1e3:g}")
     chosen = np.sort(order[:needed])
     phases = np.degrees(np.angle(waves[chosen])) + 90.0
-    return chosen + 1, (twice * np.abs(waves))[chosen], phases, float(left[needed])
+    return chosen + 1, (twice * np.abs(waves))[chosen], phases, float(without[needed])

@@ -52,7 +52,7 @@ def with_duration(loaded: LoadedCase, seconds: float) -> LoadedCase:
 def starters() -> dict[str, str]:
     """Commented files to start from, valid as they are, by their names; the first line of each is its question."""
     files = resources.files("brakecli.case").joinpath("starters").iterdir()
-    return {each.name.removesuffix(".toml"): each.read_text(encoding="utf-8") for each in sorted(files, key=str)}
+    return {file.name.removesuffix(".toml"): file.read_text(encoding="utf-8") for file in sorted(files, key=str)}
 
 
 def read_text(source: str, *, pipes: bool = False) -> tuple[str, str]:
@@ -85,16 +85,16 @@ def read_text(source: str, *, pipes: bool = False) -> tuple[str, str]:
 
 
 def parse_case(
-    text: str, label: str, overrides: Sequence[str] = (), known: Mapping[str, Record] | None = None
+    text: str, label: str, overrides: Sequence[str] = (), profiles: Mapping[str, Record] | None = None
 ) -> LoadedCase:
     """Make a case of a TOML text, which messages call `label`. Raises `CaseError`, which holds every problem.
 
     An override reads `key.path=VALUE`, the value in TOML. It replaces what the text says, creates the tables that
     it needs, and takes effect before anything is checked. Of two keys that exclude each other, such as a constant
     load and a schedule, an override of one removes the other from the text. Measured profiles are read unless they
-    are `known`, or among the `arrays`.
+    are among the `profiles` or the `arrays`.
     """
-    records = Records({**arrays.get({}), **(known or {})})
+    records = Records({**arrays.get({}), **(profiles or {})})
     with reading(records):
         case = parse_table(Case, text, label, overrides)
     resolved = resolved_toml(case)
@@ -182,7 +182,7 @@ def parse_over_case(
 
     Overrides of its `own` keys belong to the file, all others to its case. Raises `CaseError`.
     """
-    for_file = [each for each in overrides if (*key_path(each.partition("=")[0]), "")[0] in own]
+    for_file = [override for override in overrides if (*key_path(override.partition("=")[0]), "")[0] in own]
     table = parse_table(kind, text, name, for_file)
     lines = Located(text, name).lines
     try:
@@ -190,9 +190,13 @@ def parse_over_case(
     except CaseError as error:
         at = Problem(("case",), "", "", name, lines.get(("case",), 0))
         raise CaseError(
-            [replace(at, what=f"{each.where} {each.what}", remedy=each.remedy) for each in error.problems]
+            [
+                replace(at, what=f"{problem.where} {problem.what}", remedy=problem.remedy)
+                for problem in error.problems
+            ]
         ) from error
-    return table, parse_case(case_text, source, [each for each in overrides if each not in for_file]), lines
+    for_case = [override for override in overrides if override not in for_file]
+    return table, parse_case(case_text, source, for_case), lines
 
 
 def put(
@@ -218,9 +222,9 @@ def put(
     beside = {other for group in groups if key in group for other in group}
     excluded = [(*parents, other) for group in groups for other in group if beside and other not in beside]
     for other in (*excluded, *kind.needless.get(path, ())):
-        place = table if other[:-1] == path[:-1] else data.get(str(other[0]))
-        if other not in kept and isinstance(place, dict):
-            place.pop(other[-1], None)
+        parent_table = table if other[:-1] == path[:-1] else data.get(str(other[0]))
+        if other not in kept and isinstance(parent_table, dict):
+            parent_table.pop(other[-1], None)
     return created
 
 

@@ -29,40 +29,40 @@ _SINES = ("amplitudes", "wavelengths", "wavenumbers", "orders", "phases_deg")
 class Records(dict[str, Record]):
     """Measured profiles by path. Each is read when it is first asked for, and never again: a file may change."""
 
-    def __init__(self, known: Mapping[str, Record]) -> None:
-        """Begin with those that are known."""
-        super().__init__(known)
-        self._files = {os.path.realpath(path): record for path, record in known.items()}
+    def __init__(self, profiles: Mapping[str, Record]) -> None:
+        """Begin with those that were read before."""
+        super().__init__(profiles)
+        self._files = {os.path.realpath(path): record for path, record in profiles.items()}
 
     def __missing__(self, path: str) -> Record:
         """Read a profile, which other names of its file then have in common."""
         from brakecli.case.profile import read
 
         file = os.path.realpath(path)
-        self[path] = self._files[file] = found = self._files.get(file) or read(Path(file))
-        if sum(2 * len(each.place) for each in {*self.values()}) > MOST_MEASURED:
+        self[path] = self._files[file] = record = self._files.get(file) or read(Path(file))
+        if sum(2 * len(profile.place) for profile in {*self.values()}) > MOST_MEASURED:
             what = f"the measured profiles take more than {MOST_MEASURED / 1e6:g} MB"
             raise UsageError(f"{what}; measure fewer places")
-        return found
+        return record
 
 
-_known = ContextVar[Mapping[str, Record]]("measured profiles")
+_profiles = ContextVar[Mapping[str, Record]]("measured profiles")
 
 
 @contextmanager
 def reading(records: Mapping[str, Record]) -> Iterator[None]:
     """Within the block measured profiles are those of `records`."""
-    before = _known.set(records)
+    before = _profiles.set(records)
     try:
         yield
     finally:
-        _known.reset(before)
+        _profiles.reset(before)
 
 
 def record_of(path: str) -> Record:
     """A measured profile; raises UnreadableResultError, UsageError and OSError."""
     try:
-        return _known.get(Records({}))[path]
+        return _profiles.get(Records({}))[path]
     except KeyError:
         raise UsageError("was not read when the sweep began; name it in the case, or in an axis") from None
 
@@ -152,8 +152,8 @@ class Profile(Table):
 
     def sines(self) -> dict[str, Any]:
         """The lists of its sines, by the names of their keys."""
-        known = {key: value for key in _SINES if (value := getattr(self, key, None)) is not None}
-        return {**self.spectrum.sines(), **known} if self.spectrum else known
+        lists = {key: value for key in _SINES if (value := getattr(self, key, None)) is not None}
+        return {**self.spectrum.sines(), **lists} if self.spectrum else lists
 
 
 class WheelProfile(Profile):

@@ -25,8 +25,8 @@ def system_of(case: Case) -> System:
     solver = case.solver
     automatic = solver.scheme == "auto"
     shoe, wheel_surface = (
-        surface_of(each, wheel.radius) if each is not None else _SMOOTH
-        for each in (case.roughness.shoe, case.roughness.wheel)
+        surface_of(profile, wheel.radius) if profile is not None else _SMOOTH
+        for profile in (case.roughness.shoe, case.roughness.wheel)
     )
     if initial.wheel_angle and wheel_surface.g.size:
         wheel_surface = turned(wheel_surface, initial.wheel_angle * wheel.radius)
@@ -58,5 +58,7 @@ def system_of(case: Case) -> System:
             allow_unconverged=solver.allow_unconverged,
             automatic=automatic and case.contact.evaluator == "auto",
         ),
-        notes=tuple(f"roughness.{side}: {each.note}" for side, each in case.roughness if each and each.note),
+        notes=tuple(
+            f"roughness.{side}: {profile.note}" for side, profile in case.roughness if profile and profile.note
+        ),
     )

@@ -20,7 +20,7 @@ from pydantic import (
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import InitErrorDetails, PydanticCustomError, core_schema
 
-from brakecli.errors import KeyPath, Problem, found
+from brakecli.errors import KeyPath, Problem, found_text
 from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.schemes import SCHEMES
 
@@ -116,17 +116,19 @@ class Table(BaseModel):
     def _broken_rules(self) -> Iterator[Problem]:
         """Yield a problem for every rule between keys that does not hold."""
         groups = self.alternatives if self.one_is_needed else ((), *self.alternatives)
-        given = [key for key in dict.fromkeys(sum(groups, ())) if getattr(self, key) is not None]
-        missing = [[key for key in group if key not in given] for group in groups if {*given} <= {*group}]
-        if given and not missing:
+        present = [key for key in dict.fromkeys(sum(groups, ())) if getattr(self, key) is not None]
+        missing = [[key for key in group if key not in present] for group in groups if {*present} <= {*group}]
+        if present and not missing:
             # the first that is given completely, otherwise in part
-            kept = max(self.alternatives, key=lambda group: ({*group} <= {*given}) + bool({*group} & {*given}))
-            key = next(key for key in given if key not in kept)
-            others = " and ".join(other for other in kept if other in given)
+            chosen = max(
+                self.alternatives, key=lambda group: ({*group} <= {*present}) + bool({*group} & {*present})
+            )
+            key = next(key for key in present if key not in chosen)
+            others = " and ".join(other for other in chosen if other in present)
             yield self.wrong(key, f"is given together with {others}", "keep one of the two")
         elif len(missing) == 1:
             for key in missing[0]:
-                yield Problem((key,), MISSING, f"give {' and '.join((*given, *missing[0]))} together")
+                yield Problem((key,), MISSING, f"give {' and '.join((*present, *missing[0]))} together")
         elif missing and all(missing):
             choices = ", or ".join(" and ".join(group) for group in missing)
             yield Problem((missing[0][0],), MISSING, f"give {choices}", instead=sum(map(tuple, missing), ()))
@@ -144,7 +146,7 @@ class Table(BaseModel):
 
     def wrong(self, key: str, what: str, remedy: str) -> Problem:
         """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
-        return Problem(tuple(key.split(".")), what + found(attrgetter(key)(self)), remedy)
+        return Problem(tuple(key.split(".")), what + found_text(attrgetter(key)(self)), remedy)
 
     def broken(self, *rules: tuple[Any, str, str, str]) -> Iterator[Problem]:
         """Yield a problem for each rule that is broken: whether it is, then the key, what is wrong, what to do."""
@@ -166,7 +168,7 @@ class Table(BaseModel):
             if not isinstance(data, dict):
                 raise
             errors = [*_again(error)]
-            table = cls._without({str(each["loc"][0]) for each in errors}, data)
+            table = cls._without({str(details["loc"][0]) for details in errors}, data)
         # A rule that needs a wrong key meets no attribute: it waits until that key is right.
         with suppress(AttributeError) if errors else nullcontext():
             table._fill()
@@ -214,11 +216,11 @@ def _as_error(problem: Problem) -> InitErrorDetails:
 
 def _again(error: ValidationError, most: int | None = None) -> Iterator[InitErrorDetails]:
     """The errors of a validation, or the first of them, in a form that can be raised again."""
-    for each in error.errors(include_url=False)[:most]:
+    for details in error.errors(include_url=False)[:most]:
         yield InitErrorDetails(
-            type=PydanticCustomError(each["type"], each["type"], each.get("ctx")),
-            loc=each["loc"],
-            input=each["input"],
+            type=PydanticCustomError(details["type"], details["type"], details.get("ctx")),
+            loc=details["loc"],
+            input=details["input"],
         )
 
 
@@ -263,7 +265,7 @@ def _schema_with(kind: type[Table], names: tuple[str, ...]) -> dict[str, Any]:
 def key_schema(kind: type[Table], path: KeyPath) -> dict[str, Any]:
     """The JSON Schema of one key of a table, of an inner table, or of an entry of a list; its unit is included."""
     schema = node = json_schema(kind)
-    for part in path:
-        node = {"unit": node.get("unit"), **node["items"]} if isinstance(part, int) else node["properties"][part]
+    for step in path:
+        node = {"unit": node.get("unit"), **node["items"]} if isinstance(step, int) else node["properties"][step]
         node = schema["$defs"][node["$ref"].rpartition("/")[2]] if "$ref" in node else node
     return node

@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from brakecli.case.tables import LARGEST, MISSING, SMALLEST, Table, key_schema, tables_within
-from brakecli.errors import KeyPath, Problem, found, key_text
+from brakecli.errors import KeyPath, Problem, found_text, key_text
 
 _WHAT = {
     "float_type": "is not a number",
@@ -37,14 +37,18 @@ def problems(error: ValidationError, kind: type[Table], where: str = "at the top
     """Everything that is wrong with a table, in plain words; where says to what its own keys belong."""
     tables = tables_within(kind)
     errors = error.errors(include_url=False)
-    meant = {each["loc"]: _meant(each["loc"], tables) for each in errors if each["type"] == "extra_forbidden"}
+    meant = {
+        details["loc"]: _meant(details["loc"], tables)
+        for details in errors
+        if details["type"] == "extra_forbidden"
+    }
     misspelt = [paths[0] for paths in meant.values() if paths]
-    for each in errors:
-        path = each["loc"]
-        value = each["input"]
-        reason = each["type"]
+    for details in errors:
+        path = details["loc"]
+        value = details["input"]
+        reason = details["type"]
         if reason == "rule":
-            problem = replace(each["ctx"]["problem"], path=path)
+            problem = replace(details["ctx"]["problem"], path=path)
             if problem.what != MISSING or not any(_may_be(problem, near) for near in misspelt):
                 yield problem
         elif reason == "missing":
@@ -52,23 +56,25 @@ def problems(error: ValidationError, kind: type[Table], where: str = "at the top
                 yield Problem(path, MISSING, f"give {_expected(path, kind)}")
         elif reason == "model_type" and isinstance(value, float) and (needed := _required(key_schema(kind, path))):
             choices = " or ".join(key_text((*path, key)) for key in needed)
-            yield Problem(path, "is a table, not a number" + found(value), f"did you mean {choices}?")
+            yield Problem(path, "is a table, not a number" + found_text(value), f"did you mean {choices}?")
         elif reason != "extra_forbidden":
             too_large = reason == "float_type" and type(value) is int
             yield Problem(
-                path, _WHAT["magnitude" if too_large else reason] + found(value), f"give {_expected(path, kind)}"
+                path,
+                _WHAT["magnitude" if too_large else reason] + found_text(value),
+                f"give {_expected(path, kind)}",
             )
         elif path[0] == "friction" and ("friction", "coefficient") not in meant[path]:
             remedy = "the model has one coefficient, the same in stick and in slip: give friction.coefficient"
-            yield Problem(path, "is unknown" + found(value), remedy)
+            yield Problem(path, "is unknown" + found_text(value), remedy)
         elif not meant[path]:
             parent = _table(path)
             keys = ", ".join(tables[parent].model_fields)
             remedy = f"the keys {f'of {_name(parent, tables)}' if parent else where} are {keys}"
-            yield Problem(path, "is unknown" + found(value), remedy)
+            yield Problem(path, "is unknown" + found_text(value), remedy)
         else:
             near = " or ".join(_name(near, tables) for near in meant[path])
-            yield Problem(path, "is unknown" + found(value), f"did you mean {near}?")
+            yield Problem(path, "is unknown" + found_text(value), f"did you mean {near}?")
             inner = tables.get(_names(meant[path][0]))
             if inner and isinstance(value, dict):  # a table whose name is misspelt has keys, too
                 try:
@@ -82,11 +88,11 @@ def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
     """The key paths that an unknown one was probably meant to be; empty if none comes near."""
     parent = _table(path)
     key = str(path[-1])
-    known = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
-    if key not in known:
+    names = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
+    if key not in names:
         if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=_LIKE_HERE):
             return [(*path[:-1], near[0])]
-        key = next(iter(get_close_matches(key, known, n=1, cutoff=_LIKE)), "")
+        key = next(iter(get_close_matches(key, names, n=1, cutoff=_LIKE)), "")
     return [(*table, key) for table, kind in tables.items() if key in kind.model_fields]
 
 
@@ -107,7 +113,7 @@ def _header(path: KeyPath, kind: type[Table]) -> str:
 
 def _names(path: KeyPath) -> KeyPath:
     """A path without the places in lists."""
-    return tuple(part for part in path if isinstance(part, str))
+    return tuple(step for step in path if isinstance(step, str))
 
 
 def _table(path: KeyPath) -> KeyPath:

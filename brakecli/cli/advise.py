@@ -3,9 +3,9 @@
 from functools import partial
 
 from brakecli.api.commands import advise
-from brakecli.api.given import case_of
 from brakecli.api.progress import telling
 from brakecli.api.records import Advise
+from brakecli.api.values import case_of
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 

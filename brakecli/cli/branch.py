@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import cast
 
 from brakecli.api.commands import explorer_of, slips_in
-from brakecli.api.given import case_of, ends_of
 from brakecli.api.inputs import result_path
 from brakecli.api.progress import telling
 from brakecli.api.records import Branch
+from brakecli.api.values import case_of, ends_of
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.results.os_signals import lastly, signals_deferred
@@ -35,14 +35,14 @@ def command(options: Branch, details: Details = False, as_json: AsJson = False, 
         units = unit(keys[0])
         with new_result(target, force=options.force) if target else nullcontext():  # whether it can be written
             pass
-        kept = f"what was followed up to here is in {target}" if target else ""
-        with lastly(lambda: kept), signals_deferred() as waiting:  # until here a signal ends it at once
+        message = f"what was followed up to here is in {target}" if target else ""
+        with lastly(lambda: message), signals_deferred() as waiting:  # until here a signal ends it at once
             explorer.stop = lambda: bool(waiting)
-            found = follow()
+            answers = follow()
             hide_signals()  # from what writes the file
             if target:
-                write(target, loaded, found, units, force=options.force)
+                write(target, loaded, answers, units, force=options.force)
     warn(*slips_in(loaded))
-    numbers = {**values_of(BRANCH, found), "output": target and str(target)}
+    numbers = {**values_of(BRANCH, answers), "output": target and str(target)}
     view = partial(of_branch, numbers, loaded.case.title, units)
     show_result("branch", numbers, view, as_json=as_json, quiet=quiet, details=details)

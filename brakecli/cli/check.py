@@ -6,10 +6,10 @@ from functools import partial
 from pathlib import Path
 from typing import Annotated
 
-from brakecli.api.given import case_of, overrides, study_of
 from brakecli.api.inputs import kind_of_file, load_sweep
 from brakecli.api.options import Description
 from brakecli.api.records import Settings
+from brakecli.api.values import case_of, overrides, study_of
 from brakecli.cli.options import AsJson, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 
@@ -53,15 +53,15 @@ def command(options: Check, as_json: AsJson = False, quiet: Quiet = False) -> No
     from brakecli.views.file import of_check
 
     with within_range():
-        found = check(system_of(loaded.case))
-    numbers = {"valid": True, "coefficients": found.system.coefficients._asdict()}
-    numbers |= {name: getattr(found.system, name) for name in OF_SYSTEM} | vars(found) | vars(found.limits)
+        report = check(system_of(loaded.case))
+    numbers = {"valid": True, "coefficients": report.system.coefficients._asdict()}
+    numbers |= {name: getattr(report.system, name) for name in OF_SYSTEM} | vars(report) | vars(report.limits)
     infinite = [name for name, value in numbers.items() if value in (math.inf, -math.inf)]
     for name in ("system", "limits", *infinite):
         del numbers[name]
-    show_result("check", numbers, partial(of_check, found, loaded.case.title), as_json=as_json, quiet=quiet)
-    warn(*found.warnings)
-    refuse(found, free_bytes(Path()))
+    show_result("check", numbers, partial(of_check, report, loaded.case.title), as_json=as_json, quiet=quiet)
+    warn(*report.warnings)
+    refuse(report, free_bytes(Path()))
 
 
 def _check_study(options: Check, *, as_json: bool, quiet: bool) -> None:
@@ -75,12 +75,12 @@ def _check_study(options: Check, *, as_json: bool, quiet: bool) -> None:
     drawing = draw(loaded)
     size = size_of_study(loaded, drawing)
     counts = {"samples": drawing.samples, "index_samples": drawing.index_samples}
-    asked = {"method": study.method, "indices_of": study.indices_of}
+    method = {"method": study.method, "indices_of": study.indices_of}
     numbers = {
         "valid": True,
         **counts,
-        "keys": [path for each in study.parameter for path in each.paths],
-        **asked,
+        "keys": [path for axis in study.parameter for path in axis.paths],
+        **method,
         **vars(size),
     }
     view = partial(of_study_size, study, counts, size, loaded.title)

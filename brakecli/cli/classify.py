@@ -47,7 +47,6 @@ def command(
         except (UnreadableResultError, UsageError) as error:
             failures.append(error)
             results.append({"source": source, "error": str(error)})
-    found = {"results": results}
-    show_result("classify", found, lambda show: of_verdicts(results), as_json=as_json, quiet=quiet)
+    show_result("classify", {"results": results}, lambda show: of_verdicts(results), as_json=as_json, quiet=quiet)
     if failures:
         raise type(failures[0])("\n".join(dict.fromkeys(str(error) for error in failures)))

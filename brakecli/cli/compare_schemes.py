@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 from typing import Annotated
 
-from brakecli.api.given import case_of
 from brakecli.api.inputs import result_path
 from brakecli.api.options import Description
 from brakecli.api.progress import telling
 from brakecli.api.records import Case, Force, Settings, target
+from brakecli.api.values import case_of
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result
 from brakecli.solver.schemes import SCHEMES
@@ -52,8 +52,8 @@ def command(
     with telling(quiet) as tell:
         with new_result(target, force=options.force):  # whether it can be written is known beforehand
             pass
-        found = compare(system, schemes=schemes, steps=steps, budget=options.budget, progress=tell)
-        report = ComparisonReport(target, loaded.case, found, options.target_error)
+        comparison = compare(system, schemes=schemes, steps=steps, budget=options.budget, progress=tell)
+        report = ComparisonReport(target, loaded.case, comparison, options.target_error)
         write(target, loaded, report, force=options.force)
     numbers = {"output": str(target), **report.numbers()}
     show_result(

@@ -17,8 +17,8 @@ def command(options: Diff, details: Details = False, as_json: AsJson = False, qu
     from brakecli.views.file import of_difference
 
     target = None if options.output is None else Path(options.output)
-    found = diff(options, Path(str(options.first)), Path(str(options.second)), target)
-    numbers = values_of(DIFFERENCE_OF_TWO, found)
+    differences = diff(options, Path(str(options.first)), Path(str(options.second)), target)
+    numbers = values_of(DIFFERENCE_OF_TWO, differences)
     files = {"a": str(options.first), "b": str(options.second), "output": str(options.output or "")}
     shown = {**files, "output": options.output and str(options.output), **numbers}
     view = partial(of_difference, numbers, files)

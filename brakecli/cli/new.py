@@ -74,8 +74,8 @@ def command(options: New, quiet: Quiet = False) -> None:
     written = {path: text}
     if base and not (path.parent / base).exists():
         written[path.parent / base] = texts[base.removesuffix(".toml")]
-    for place, content in written.items():
-        with new_output(place, force=options.force) as file:
+    for destination, content in written.items():
+        with new_output(destination, force=options.force) as file:
             file.write(content.encode())
             file.publish()
     if not quiet:

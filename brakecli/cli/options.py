@@ -21,12 +21,16 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     record = own["options"].annotation
     fields = inspect.signature(record).parameters
     shared = [_as_in_typer(fields[name], said) for name, said in described(record).items() if said.in_shell]
-    beside = [each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for name, each in own.items() if name != "options"]
+    beside = [
+        parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)
+        for name, parameter in own.items()
+        if name != "options"
+    ]
 
     @wraps(command)
-    def called(**given: Any) -> None:
-        options = record(**{each.name: given.pop(each.name) for each in shared})
-        command(options, **given)
+    def called(**arguments: Any) -> None:
+        options = record(**{parameter.name: arguments.pop(parameter.name) for parameter in shared})
+        command(options, **arguments)
 
     called.__signature__ = inspect.Signature([*shared, *beside])  # type: ignore[attr-defined]
     return called

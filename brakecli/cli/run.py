@@ -2,10 +2,10 @@
 
 from functools import partial
 
-from brakecli.api.given import case_of
 from brakecli.api.inputs import result_path
 from brakecli.api.progress import say, telling
 from brakecli.api.records import Run
+from brakecli.api.values import case_of
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError

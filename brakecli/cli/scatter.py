@@ -4,10 +4,10 @@ from dataclasses import replace
 from functools import partial
 
 from brakecli.api.commands import scatter
-from brakecli.api.given import study_of
 from brakecli.api.inputs import result_path
 from brakecli.api.progress import telling
 from brakecli.api.records import Scatter
+from brakecli.api.values import study_of
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 

@@ -4,10 +4,10 @@ from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
 from brakecli.api.commands import modes_along, slips_in, stability_of
-from brakecli.api.given import axis_of, case_of
 from brakecli.api.inputs import result_path
 from brakecli.api.progress import telling
 from brakecli.api.records import Stability
+from brakecli.api.values import axis_of, case_of
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import UsageError
@@ -41,10 +41,10 @@ def command(options: Stability, details: Details = False, as_json: AsJson = Fals
 
             with new_output(target, force=options.force) if target else nullcontext():  # whether it can be written
                 pass
-            found = modes_along(loaded, options.vary, tell)
+            diagram = modes_along(loaded, options.vary, tell)
             if target:
-                write(target, loaded, found, force=options.force)
-            numbers |= {"vary": found.entries, **values_of(LOCK_IN, found), "output": target and str(target)}
+                write(target, loaded, diagram, force=options.force)
+            numbers |= {"vary": diagram.entries, **values_of(LOCK_IN, diagram), "output": target and str(target)}
     warn(*slips_in(loaded))
     units = unit(axis.parameter[0]) if axis else ""
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 from functools import partial
 
 from brakecli.api.commands import sweep
-from brakecli.api.given import sweep_of_options
 from brakecli.api.inputs import result_path
 from brakecli.api.progress import say, telling
 from brakecli.api.records import Sweep
+from brakecli.api.values import sweep_of_options
 from brakecli.cli.options import AsJson, Details, Quiet, with_options
 from brakecli.cli.output import show_result, warn
 from brakecli.errors import BrakecliError
@@ -31,17 +31,17 @@ def command(options: Sweep, details: Details = False, as_json: AsJson = False, q
 
     with telling(quiet) as tell, keeping_points(target):
         report = sweep(replace(options, source=loaded, settings=None), target, tell, begin=begin)
-    found = report.findings
+    findings = report.findings
     warn(*report.notes)
-    warn(*found.warnings)
+    warn(*findings.warnings)
     numbers = {"output": str(report.output), **report.numbers()}
     show_result("sweep", numbers, partial(of_sweep, report), as_json=as_json, quiet=quiet, details=details)
-    for failure in found.failures:
+    for failure in findings.failures:
         where = ", ".join(f"{key} = {value}" for key, value in failure["parameters"].items())
         say(f"point {failure['point']}{f' ({where})' if where else ''}: {failure['reason']}")
-    if found.failed:
-        failed = f"{found.failed} of {found.points} points failed; all others were written"
-        if found.failed == found.points:
-            which = "its only point" if found.points == 1 else f"all {found.points} points"
+    if findings.failed:
+        failed = f"{findings.failed} of {findings.points} points failed; all others were written"
+        if findings.failed == findings.points:
+            which = "its only point" if findings.points == 1 else f"all {findings.points} points"
             failed = f"{which} failed; correct the case, the sweep or the machine, as the reasons above say"
         raise BrakecliError(f"{report.output}: {failed}")

@@ -32,12 +32,12 @@ def handle_signals() -> None:
 
     def leave(number: int, frame: FrameType | None) -> None:
         ignore_signals()
-        left = ""
+        last_words = ""
         try:
             while _last:
                 with suppress(Exception):  # a failing disk, or a bar that is just being drawn
-                    left = _last.pop()() or left
-            said = "; ".join(filter(None, (_WORDS[number], escaped(left))))
+                    last_words = _last.pop()() or last_words
+            said = "; ".join(filter(None, (_WORDS[number], escaped(last_words))))
             os.write(2, f"brakecli: {said}\n".encode())
         finally:
             os._exit(128 + number)
@@ -120,7 +120,7 @@ class _Shown(io.TextIOWrapper):
     """A standard stream that no file, name or title can use to control the terminal."""
 
     def write(self, text: str) -> int:
-        return super().write(escaped(text, kept="\n"))
+        return super().write(escaped(text, allowed="\n"))
 
 
 class Styled:

@@ -16,7 +16,7 @@ import h5py
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from brakecli.errors import CannotWriteError, UsageError, found
+from brakecli.errors import CannotWriteError, UsageError, found_text
 from brakecli.faces import argument
 from brakecli.results import valid
 from brakecli.results.atomic import OutputFile, new_output
@@ -67,15 +67,15 @@ class ResultFile:
 
     def set_fields(self, fields: Iterable[Field], values: Mapping[str, Any]) -> None:
         """Set those of the fields that belong in a file, as attributes. What does not exist is left out."""
-        for each in fields:
-            if each.in_file and each.name in values:
-                found = values[each.name] if each.group else {each.name: values[each.name]}
+        for field in fields:
+            if field.in_file and field.name in values:
+                items = values[field.name] if field.group else {field.name: values[field.name]}
                 present = {
                     name: value
-                    for name, value in found.items()
+                    for name, value in items.items()
                     if value is not None and not (isinstance(value, list) and not value)
                 }
-                self.set_attributes(present, each.group or "/")
+                self.set_attributes(present, field.group or "/")
 
     def axis(self, group: str, field: Field, values: ArrayLike | None = None) -> None:
         """Make a dimension of this name in `group`, with numbers or texts along it; without `values` it grows."""
@@ -140,10 +140,10 @@ class ResultFile:
         chunks = _chunks(shape)
         starts = [range(0, length, chunk) for length, chunk in zip(shape, chunks, strict=True)]
         first = 0
-        for place in product(*starts):
-            ends = [min(start + chunk, length) for start, chunk, length in zip(place, chunks, shape, strict=True)]
-            where = tuple(slice(start, end) for start, end in zip(place, ends, strict=True))
-            last = first + math.prod(end - start for start, end in zip(place, ends, strict=True))
+        for corner in product(*starts):
+            ends = [min(start + chunk, length) for start, chunk, length in zip(corner, chunks, shape, strict=True)]
+            where = tuple(slice(start, end) for start, end in zip(corner, ends, strict=True))
+            last = first + math.prod(end - start for start, end in zip(corner, ends, strict=True))
             yield first, last, where
             first = last
 
@@ -316,7 +316,7 @@ def _set_attributes(node: h5py.HLObject, attributes: Mapping[str, Any]) -> None:
 def _finite(name: str, values: ArrayLike) -> NDArray[Any]:
     array = np.asarray(values)
     if array.dtype.kind not in "iuf" or not np.isfinite(array).all():
-        raise ValueError(f"{name}: must be finite numbers, or text{found(values)}")
+        raise ValueError(f"{name}: must be finite numbers, or text{found_text(values)}")
     return array
 
 

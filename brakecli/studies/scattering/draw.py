@@ -3,7 +3,7 @@
 import numpy as np
 from scipy import stats
 
-from brakecli.errors import RefusedError, found
+from brakecli.errors import RefusedError, found_text
 from brakecli.solver.arrays import Floats
 from brakecli.studies.scattering.study import SCRAMBLINGS, Study
 
@@ -63,7 +63,7 @@ def has_indices(study: Study) -> bool:
 
 def _refuse_many(study: Study) -> None:
     """Raise RefusedError where samples and their values would take too much memory."""
-    excess = f"samples: are too many{found(study.samples)}"
+    excess = f"samples: are too many{found_text(study.samples)}"
     keys = sum(len(parameter.paths) for parameter in study.parameter)
     if study.samples > MOST_SAMPLES:
         raise RefusedError(f"{excess}; {MOST_SAMPLES} are the most, take fewer")

@@ -17,7 +17,7 @@ from brakecli.case import wording
 from brakecli.case.case import Case
 from brakecli.case.read import LoadedCase, key_path, parse_over_case, put
 from brakecli.case.tables import MISSING, Number, OverCase, Positive, Table, described, from_list, key_schema
-from brakecli.errors import CaseError, KeyPath, Problem, found
+from brakecli.errors import CaseError, KeyPath, Problem, found_text
 from brakecli.results.toml_lines import innermost
 from brakecli.solver.arrays import Floats
 
@@ -104,7 +104,7 @@ class Parameter(Table):
         """What is wrong with a key path, and with the limits, or the mean, that it is to take."""
         path = key_path(text)
         if not path:
-            yield Problem((name,), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+            yield Problem((name,), "is not a key path" + found_text(text), 'write it as in "link2.angle_deg"')
             return
         unknown = False
         try:
@@ -235,7 +235,9 @@ class Study(OverCase):
             for text in parameter.paths:
                 if key_path(text) in taken:
                     yield Problem(
-                        ("parameter", index, "key"), "is set twice" + found(text), "let each key path scatter once"
+                        ("parameter", index, "key"),
+                        "is set twice" + found_text(text),
+                        "let each key path scatter once",
                     )
                 taken.add(key_path(text))
         if self.correlation is not None:

@@ -8,7 +8,7 @@ from pydantic import BeforeValidator, Field
 
 from brakecli.case.read import key_path
 from brakecli.case.tables import MISSING, Number, OverCase, Positive, Table, described, from_list
-from brakecli.errors import Problem, found
+from brakecli.errors import Problem, found_text
 
 _ROUNDING = 1e-12  # of a value, beyond which eigenvalues do not tell two apart
 
@@ -16,7 +16,9 @@ _ROUNDING = 1e-12  # of a value, beyond which eigenvalues do not tell two apart
 def _not_key_paths(*texts: str) -> Iterator[Problem]:
     for text in texts:
         if not key_path(text):
-            yield Problem(("parameter",), "is not a key path" + found(text), 'write it as in "link2.angle_deg"')
+            yield Problem(
+                ("parameter",), "is not a key path" + found_text(text), 'write it as in "link2.angle_deg"'
+            )
 
 
 class Axis(Table):
@@ -126,7 +128,7 @@ class Sweep(OverCase):
         for index, text in ((index, text) for index, axis in enumerate(self.axis) for text in axis.parameter):
             if key_path(text) in taken:
                 path = ("axis", index, "parameter")
-                yield Problem(path, "is set twice" + found(text), "set each key path once")
+                yield Problem(path, "is set twice" + found_text(text), "set each key path once")
             taken.add(key_path(text))
         if self.critical is not None and key_path(self.critical.parameter) in taken:
             remedy = "look for another parameter, or leave that axis out"

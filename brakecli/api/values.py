@@ -11,7 +11,7 @@ from numbers import Real
 from os import PathLike
 from typing import TYPE_CHECKING, Any
 
-from brakecli.errors import UnreadableResultError, UsageError, found, printable, value_text
+from brakecli.errors import UnreadableResultError, UsageError, found_text, printable, value_text
 from brakecli.faces import argument
 
 if TYPE_CHECKING:
@@ -120,16 +120,16 @@ def _axis_of_text(text: str) -> "Axis":
 
 def axes_of(axes: Any, direction: Any) -> list[dict[str, Any]]:
     """The tables `[[axis]]` of a sweep."""
-    given = mapping(axes, "axes", several=True)
-    ways = dict.fromkeys(given, direction) if isinstance(direction, str) and len(given) == 1 else direction
+    by_key = mapping(axes, "axes", several=True)
+    ways = dict.fromkeys(by_key, direction) if isinstance(direction, str) and len(by_key) == 1 else direction
     ways = mapping(ways, "direction", several=True)
-    if unknown := [key for key in ways if key not in given]:
+    if unknown := [key for key in ways if key not in by_key]:
         raise UsageError(f"direction: {value_text(unknown[0])} is not among the axes; name an axis as axes does")
     return [
         {"parameter": key}
-        | dict(each if isinstance(each, Mapping) else {"values": each})
+        | dict(values if isinstance(values, Mapping) else {"values": values})
         | ({"direction": ways[key]} if key in ways else {})
-        for key, each in given.items()
+        for key, values in by_key.items()
     ]
 
 
@@ -145,38 +145,38 @@ def ends_of(parameter: "Mapping[Keys, tuple[float, float]] | str") -> tuple[tupl
     try:
         low, high = map(float, ends)
     except (TypeError, ValueError, OverflowError):
-        raise UsageError(f"parameter: is not both ends of a range{found(ends)}; give two numbers") from None
+        raise UsageError(f"parameter: is not both ends of a range{found_text(ends)}; give two numbers") from None
     return parsed(f"{keys if isinstance(keys, str) else ','.join(keys)}={low!r}:{high!r}")
 
 
 def patterns_of(keys: Any) -> list[str]:
     """Patterns of keys, as one text with commas or as a list of texts."""
-    given = keys.split(",") if isinstance(keys, str) else [*keys] if isinstance(keys, Iterable) else [keys]
-    if wrong := [each for each in given if not isinstance(each, str)]:
-        raise UsageError(f"keys: are no key paths{found(wrong[0])}; give a text, or a list of texts")
-    return given
+    patterns = keys.split(",") if isinstance(keys, str) else [*keys] if isinstance(keys, Iterable) else [keys]
+    if wrong := [pattern for pattern in patterns if not isinstance(pattern, str)]:
+        raise UsageError(f"keys: are no key paths{found_text(wrong[0])}; give a text, or a list of texts")
+    return patterns
 
 
 def margin_of(margin: Any) -> float:
     """A margin of friction, as a part of it."""
     number = margin.item() if hasattr(margin, "item") else margin  # of NumPy
     if not (isinstance(number, int | float) and 0.0 <= number <= 10.0):
-        raise UsageError(f"margin: is no number from 0 to 10{found(number)}; give one, as 0.2")
+        raise UsageError(f"margin: is no number from 0 to 10{found_text(number)}; give one, as 0.2")
     return float(number)
 
 
-def chosen_of(given: "Changes | None", name: str) -> list[str]:
+def chosen_of(choices: "Changes | None", name: str) -> list[str]:
     """Values by name as options have them, as `KEY=VALUE`."""
-    if isinstance(given, list):
-        return given
-    return [f"{key}={plain(value, f'{name}: {key}')}" for key, value in mapping(given, name).items()]
+    if isinstance(choices, list):
+        return choices
+    return [f"{key}={plain(value, f'{name}: {key}')}" for key, value in mapping(choices, name).items()]
 
 
-def text_of(given: Any, name: str) -> str:
+def text_of(text: Any, name: str) -> str:
     """A text, empty for None; raises UsageError for anything else."""
-    if not isinstance(given, str | None):
-        raise UsageError(f"{name}: is no text{found(given)}; give one, or leave it out")
-    return given or ""
+    if not isinstance(text, str | None):
+        raise UsageError(f"{name}: is no text{found_text(text)}; give one, or leave it out")
+    return text or ""
 
 
 def sweep_of_options(options: "Sweep") -> "LoadedSweep":
@@ -192,10 +192,10 @@ def sweep_of_options(options: "Sweep") -> "LoadedSweep":
             "axis": axes_of(options.axes, options.direction),
             "critical": mapping(options.critical, "critical"),
         }
-        given = plain(tables, "sweep")
-        given |= {"points": GIVEN} if listed else {}
+        content = plain(tables, "sweep")
+        content |= {"points": GIVEN} if listed else {}
         base = case_of(options.source, options.settings)
-        return sweep_of({name: each for name, each in given.items() if each}, base, listed)
+        return sweep_of({name: table for name, table in content.items() if table}, base, listed)
     if options.direction is not None:
         raise UsageError("direction: is for axes; a sweep file states it in an axis of its own")
     if not isinstance(options.source, LoadedSweep):
@@ -220,36 +220,40 @@ def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
         raise UsageError(f"points: {wrong[0]!r} is no key path; name a key as in 'link2.angle_deg'")
     if len({*map(key_path, columns)}) < len(columns):
         raise UsageError("points: a key has two columns; keep one of them")
-    lists = [each for each in columns.values() if isinstance(each, list)]
+    lists = [column for column in columns.values() if isinstance(column, list)]
     if len(lists) < len(columns) or len({*map(len, lists)}) != 1 or not all(lists):
         raise UsageError("points: need a value of each key at each point, and one point at least")
     refuse_many(len(columns), len(lists[0]), "points")
     return Listed.of([*columns], columns.values())
 
 
-def scheduler_of(given: Any) -> Any:
+def scheduler_of(scheduler: Any) -> Any:
     """The scheduler that is given, or the address in the environment; None without one."""
-    if isinstance(given, Real):
-        raise UsageError(f"scheduler: is none{found(given)}; give a client, a cluster or an address of dask")
-    return given if given is not None else os.environ.get("DASK_SCHEDULER_ADDRESS") or None
+    if isinstance(scheduler, Real):
+        raise UsageError(
+            f"scheduler: is none{found_text(scheduler)}; give a client, a cluster or an address of dask"
+        )
+    return scheduler if scheduler is not None else os.environ.get("DASK_SCHEDULER_ADDRESS") or None
 
 
 def refuse_jobs(jobs: int | None) -> None:
     """Raise UsageError for a wrong number of workers, and end a worker that is being started by a script."""
     if jobs is not None and not (isinstance(jobs, int) and 1 <= jobs <= 4096):
-        raise UsageError(f"jobs: is no number of workers from 1 to 4096{found(jobs)}; give one, or leave it out")
+        raise UsageError(
+            f"jobs: is no number of workers from 1 to 4096{found_text(jobs)}; give one, or leave it out"
+        )
     if getattr(multiprocessing.current_process(), "_inheriting", False):
         os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
 
 
-def mapping(given: Any, name: str, *, several: bool = False) -> Mapping[Any, Any]:
+def mapping(value: Any, name: str, *, several: bool = False) -> Mapping[Any, Any]:
     """A mapping by key paths, or by tuples of `several`; empty for None. Raises UsageError for anything else."""
-    if not isinstance(given, Mapping | None):
+    if not isinstance(value, Mapping | None):
         raise UsageError(f"{name}: is no mapping; write it as {{'friction.coefficient': ...}}")
-    for key in given or {}:
-        if not all(isinstance(each, str) for each in (key if several and isinstance(key, tuple) else (key,))):
-            raise UsageError(f"{name}: a key is no text{found(key)}; write it as 'friction.coefficient'")
-    return given or {}
+    for key in value or {}:
+        if not all(isinstance(path, str) for path in (key if several and isinstance(key, tuple) else (key,))):
+            raise UsageError(f"{name}: a key is no text{found_text(key)}; write it as 'friction.coefficient'")
+    return value or {}
 
 
 def _toml(value: Any, key: str) -> str:
@@ -257,19 +261,19 @@ def _toml(value: Any, key: str) -> str:
 
     value = plain(value, key)
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{name} = {_toml(each, f'{key}.{name}')}" for name, each in value.items()) + "}"
+        return "{" + ", ".join(f"{name} = {_toml(item, f'{key}.{name}')}" for name, item in value.items()) + "}"
     if isinstance(value, list):
-        return f"[{', '.join(_toml(each, key) for each in value)}]"
+        return f"[{', '.join(_toml(item, key) for item in value)}]"
     return tomli_w.dumps({"value": value}).removeprefix("value = ").strip()
 
 
 def plain(value: Any, key: str) -> Any:
     """The value of a key without NumPy or xarray, as TOML holds it, or UsageError."""
     if key.rpartition(".")[2] == "profile" and not isinstance(value, str | PathLike):
-        from brakecli.case.profile import given
+        from brakecli.case.profile import keep_array
 
         try:
-            return given(value)
+            return keep_array(value)
         except UnreadableResultError as error:
             raise UsageError(f"{key}: {error}") from error
     if isinstance(value, Mapping) and hasattr(value, "attrs"):  # a dataset, or a tree of them
@@ -278,13 +282,13 @@ def plain(value: Any, key: str) -> Any:
     value = value.to_numpy() if hasattr(value, "to_numpy") else value
     value = value.tolist() if hasattr(value, "tolist") else value
     if isinstance(value, Mapping):
-        return {name: plain(each, f"{key}.{name}") for name, each in mapping(value, key).items()}
+        return {name: plain(item, f"{key}.{name}") for name, item in mapping(value, key).items()}
     if isinstance(value, Iterable) and not isinstance(value, str):
-        return [plain(each, key) for each in value]
+        return [plain(item, key) for item in value]
     if not isinstance(value, str | int | float | date | time | PathLike):
         raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
     if isinstance(value, str) and not value.isascii() and any(0xD800 <= ord(sign) < 0xE000 for sign in value):
-        raise UsageError(f"{key}: is not UTF-8{found(value)}; write it in UTF-8")
+        raise UsageError(f"{key}: is not UTF-8{found_text(value)}; write it in UTF-8")
     if isinstance(value, int) and value.bit_length() >= _LARGEST_BITS:
-        raise UsageError(f"{key}: is too large for a number{found(value)}; give a smaller one")
+        raise UsageError(f"{key}: is too large for a number{found_text(value)}; give a smaller one")
     return str(value) if isinstance(value, PathLike) else value
