@@ -37,14 +37,14 @@ def run(options: Run) -> "xr.DataTree":
     """
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.results.as_xarray import opened
+        from brakecli.results.as_xarray import read_tree
         from brakecli.studies.runs.run import run
 
         report = run(loaded, path, force=options.force, progress=tell)
         warn(report.warnings)
         if report.motion.work.failed:
             raise BrakecliError(str(report.motion.work.failure_sentence))
-        return opened(path)
+        return read_tree(path)
 
 
 @takes(Stability)
@@ -64,7 +64,7 @@ def stability(options: Stability) -> "xr.Dataset":
     """
     with called(), telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.results.as_xarray import dataset, opened
+        from brakecli.results.as_xarray import dataset, read_tree
         from brakecli.results.stability_fields import STABILITY, THRESHOLDS
 
         warn(slips_in(loaded))
@@ -79,7 +79,7 @@ def stability(options: Stability) -> "xr.Dataset":
             write(Path(options.output), loaded, diagram, force=options.force)
         with target(None) as path:
             write(path, loaded, diagram, force=False)
-            return opened(path).to_dataset()
+            return read_tree(path).to_dataset()
 
 
 @takes(Branch)
@@ -100,7 +100,7 @@ def branch(options: Branch) -> "xr.DataTree":
     """
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
         loaded = case_of(options.case, options.settings)
-        from brakecli.results.as_xarray import opened
+        from brakecli.results.as_xarray import read_tree
         from brakecli.studies.runs.branch import write
         from brakecli.studies.sweeps.result import unit
 
@@ -111,7 +111,7 @@ def branch(options: Branch) -> "xr.DataTree":
             _, follow = commands.explorer_of(loaded, options, files, tell)
         warn(slips_in(loaded))
         write(path, loaded, follow(), unit(keys[0]), force=options.force)
-        return opened(path)
+        return read_tree(path)
 
 
 @takes(Advise)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from brakecli.errors import CaseError, UnreadableResultError, UsageError
 from brakecli.faces import argument, command
-from brakecli.results.atomic import led_to, refuse_source
+from brakecli.results.atomic import follow_link, refuse_source
 from brakecli.results.opening import is_hdf5
 
 if TYPE_CHECKING:
@@ -131,7 +131,7 @@ def result_path(
     target = Path(output or (kind if name == "-" else Path(name).stem) + ending)
     if name != "-" and not is_result(name):
         refuse_source(target, name, kind)
-    suffix = led_to(target).suffix
+    suffix = follow_link(target).suffix
     if suffix.lower() in (".txt", ".csv", ".json", ".png", ".pdf", ".svg", ".toml") and ending == ".h5":
         raise UsageError(
             f"{target}: a result is HDF5, not {suffix}; name a file that ends in .h5 with {argument('output')}"

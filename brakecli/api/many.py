@@ -29,7 +29,7 @@ def sweep(options: Sweep) -> "xr.Dataset":
     refuse_jobs(options.jobs)
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
         from brakecli.results import fields
-        from brakecli.results.as_xarray import opened
+        from brakecli.results.as_xarray import read_tree
         from brakecli.results.field import values_of
 
         report = commands.sweep(options, path, tell, in_caller=True)
@@ -38,7 +38,7 @@ def sweep(options: Sweep) -> "xr.Dataset":
         if failures := report.findings.failures:
             failed = f"{report.findings.failed} of {report.findings.points} points failed"
             warn([f"{failed}, the first: {failures[0]['reason']}"])
-        result = opened(path).to_dataset()  # without groups
+        result = read_tree(path).to_dataset()  # without groups
         if report.findings.attractors is not None:
             attractors = [values_of(fields.ATTRACTOR, attractor) for attractor in report.findings.attractors]
             result.attrs["attractors"] = json.dumps(attractors)
@@ -61,8 +61,8 @@ def scatter(options: Scatter) -> "xr.Dataset":
     """
     refuse_jobs(options.jobs)
     with called(), target(options.output) as path, telling_to(options.progress) as tell:
-        from brakecli.results.as_xarray import opened
+        from brakecli.results.as_xarray import read_tree
 
         _, warnings = commands.scatter(options, path, tell, in_caller=True)
         warn(warnings)
-        return opened(path).to_dataset()
+        return read_tree(path).to_dataset()

@@ -37,9 +37,9 @@ def load(source: "File", settings: "Changes | None" = None) -> Any:
         if is_result(name):
             if settings:
                 raise UsageError(f"{name}: holds a result, which has no settings; give them to brakecli.run")
-            from brakecli.results.as_xarray import opened
+            from brakecli.results.as_xarray import read_tree
 
-            return opened(Path(name))
+            return read_tree(Path(name))
         kinds: dict[str, Callable[[str, list[str]], Any]] = {"sweep": load_sweep, "study": load_study}
         return kinds.get(kind_of_file(name), load_case)(name, overrides(settings))
 

@@ -23,7 +23,7 @@ from brakecli.case.tables import MISSING, OverCase, Table, tables_within
 from brakecli.errors import CaseError, KeyPath, Problem, key_text, printable
 from brakecli.faces import argument
 from brakecli.results import toml_lines
-from brakecli.results.opening import SIGNATURE, opened
+from brakecli.results.opening import SIGNATURE, open_regular
 from brakecli.results.toml_lines import WRITING, Located, check_size, innermost, parse, split, unfit
 
 _Table = TypeVar("_Table", bound=Table)
@@ -63,7 +63,9 @@ def read_text(source: str, *, pipes: bool = False) -> tuple[str, str]:
     """
     name = "standard input" if source == "-" else source
     try:
-        stream = nullcontext(sys.stdin.buffer) if source == "-" else BufferedReader(opened(source, pipes=pipes))
+        stream = (
+            nullcontext(sys.stdin.buffer) if source == "-" else BufferedReader(open_regular(source, pipes=pipes))
+        )
         with stream as file:
             data = file.read(toml_lines.LARGEST_TEXT + 1)
     except (OSError, ValueError, AttributeError) as error:

@@ -21,7 +21,7 @@ _WITHOUT_GAPS = ("history", "spectrum", "spectrogram", "events")
 """Groups of a run in which no number is missing."""
 
 
-def opened(path: Path) -> xr.DataTree:
+def read_tree(path: Path) -> xr.DataTree:
     """A result file in memory. A run without a frequency has NaN as its attribute `frequency`, as no file has."""
     with open_result(path) as result, explained(path):
         result.stream.seek(0)

@@ -83,7 +83,7 @@ class OutputFile(FileIO):
         self.check()
         with explained(self.path):
             os.fsync(self.fileno())
-            _checked_target(self.path, force=self._force)
+            _resolve(self.path, force=self._force)
             self._temporary.replace(self._target)
         with suppress(OSError), ExitStack() as clean_up:  # some network file systems refuse; the file is there
             directory = os.open(self._target.parent, os.O_RDONLY)
@@ -97,7 +97,7 @@ class OutputFile(FileIO):
                 action()
 
 
-def led_to(path: Path) -> Path:
+def follow_link(path: Path) -> Path:
     """The file that a path stands for: that to which a symbolic link leads, also in a directory that is gone."""
     is_link = os.path.islink(path)  # noqa: PTH114 - pathlib's may raise
     return Path(os.path.realpath(path)) if is_link else path
@@ -108,7 +108,7 @@ def check_target(target: Path, what: str, suffixes: Sequence[str], results: Iter
 
     The same holds for the file that a symbolic link leads to.
     """
-    ends = [name.suffix for name in (target, led_to(target))]
+    ends = [name.suffix for name in (target, follow_link(target))]
     if wrong := [suffix for suffix in ends if suffix.lower() not in suffixes]:
         problem = f"its suffix does not name {what} (found {wrong[0]!r})"
         named = " or ".join(filter(None, (", ".join(suffixes[:-1]), suffixes[-1])))
@@ -133,7 +133,7 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
     Raises CannotWriteError where nothing can be written, now or later, and UsageError where the file exists and
     `force` is not set or where another process is writing it. A symbolic link is followed.
     """
-    target = _checked_target(path, force=force)
+    target = _resolve(path, force=force)
     lock = target.with_name(f".{target.name}.lock")
     clean_up = ExitStack()
 
@@ -143,7 +143,7 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
 
     with lastly(leave_nothing):
         with signals_deferred(), explained(path):
-            descriptor = _acquired(path, lock)
+            descriptor = _acquire(path, lock)
             clean_up.callback(_release, descriptor, lock)
             temporary = target.with_name(f".{target.name}.part")
             if os.path.lexists(temporary) and not os.fstat(descriptor).st_size:  # a killed process leaves both
@@ -159,7 +159,7 @@ def new_output(path: Path, *, force: bool) -> Iterator[OutputFile]:
             raise
 
 
-def _checked_target(path: Path, *, force: bool) -> Path:
+def _resolve(path: Path, *, force: bool) -> Path:
     """The file that `path` stands for, unless something prevents writing it."""
     with explained(path):
         target = Path(os.path.realpath(path))
@@ -181,7 +181,7 @@ def _checked_target(path: Path, *, force: bool) -> Path:
     return target
 
 
-def _acquired(path: Path, lock: Path) -> int:
+def _acquire(path: Path, lock: Path) -> int:
     """Open and lock the lock file, unless another process holds it."""
     while True:
         descriptor = open_own(lock, os.O_RDWR | os.O_CREAT)

@@ -14,7 +14,7 @@ SIGNATURE = b"\x89HDF\r\n\x1a\n"
 _OPEN_PIPES = ("/dev/fd/", "/dev/stdin", "/proc/self/fd/")  # where a shell names the pipes of `<(command)`
 
 
-def opened(path: str | PathLike[str], *, pipes: bool = False) -> FileIO:
+def open_regular(path: str | PathLike[str], *, pipes: bool = False) -> FileIO:
     """A regular file, open for reading; anything else is refused at once, as a pipe may never end.
 
     With `pipes`, also one that the shell has opened for this process. Raises OSError, and ValueError for a NUL.
@@ -30,7 +30,7 @@ def opened(path: str | PathLike[str], *, pipes: bool = False) -> FileIO:
 
 def contents(path: str | PathLike[str], most: int) -> bytes:
     """All bytes of a regular file; raises OSError where it has more than `most`."""
-    with BufferedReader(opened(path)) as file:
+    with BufferedReader(open_regular(path)) as file:
         data = file.read(most + 1)
     if len(data) > most:
         raise OSError(f"it is larger than {most} bytes")
@@ -39,7 +39,7 @@ def contents(path: str | PathLike[str], most: int) -> bytes:
 
 def is_hdf5(path: str | PathLike[str]) -> bool:
     """Whether this is a regular file with the signature of HDF5, behind a user block or not."""
-    with suppress(OSError, ValueError), opened(path) as file:
+    with suppress(OSError, ValueError), open_regular(path) as file:
         return hdf5_begin(file) is not None
     return False
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from brakecli.errors import OtherKindError, UnreadableResultError, printable
 from brakecli.faces import command
-from brakecli.results.opening import hdf5_begin, opened
+from brakecli.results.opening import hdf5_begin, open_regular
 
 FORMAT = "brakecli"
 FORMAT_VERSION = 1
@@ -115,7 +115,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
     """
     with ExitStack() as stack:
         with explained(path):
-            stream = stack.enter_context(opened(path))
+            stream = stack.enter_context(open_regular(path))
             _check_digest(path, stream)
             # h5py gets the very file that was looked at, and does without the file locks of HDF5
             file = stack.enter_context(h5py.File(stream, "r"))

@@ -12,7 +12,7 @@ import pytest
 from brakecli.analysis.signals.look import Measurand
 from brakecli.analysis.signals.read import read_signal
 from brakecli.errors import UnreadableResultError
-from brakecli.results.opening import contents, opened
+from brakecli.results.opening import contents, open_regular
 from brakecli.results.read import open_result
 from brakecli.results.table import TextTable
 from tests.results.results import write
@@ -22,7 +22,7 @@ from tests.results.results import write
 def test_what_is_no_regular_file_is_refused_at_once(tmp_path: Path, make: object) -> None:
     make(tmp_path / "x")  # type: ignore[operator]
     with pytest.raises(OSError, match="not a regular file"):
-        opened(tmp_path / "x")
+        open_regular(tmp_path / "x")
 
 
 def test_more_bytes_than_the_bound_are_refused(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from h5py import h5a, h5d, h5s, h5t, h5z
 
 from brakecli.analysis.spectrum import Array
 from brakecli.errors import UnreadableResultError, printable
-from brakecli.results.opening import opened
+from brakecli.results.opening import open_regular
 
 SHORTEST_TRIAL = 5.0  # s of processor time, and 0.1 s for each MB, to read a file that may be damaged
 _WAITING = 10.0  # times as long may it take where other processes or a slow disk hold it up
@@ -34,7 +34,7 @@ _LISTED = 12  # datasets in a message
 
 def dataset(path: Path, inside: str, most: int) -> tuple[Array, str]:
     """A row of at most so many numbers with its attribute `units`; whatever h5py raises on damage is reported."""
-    with opened(path) as stream:
+    with open_regular(path) as stream:
         row = partial(_row, inside=inside, most=most, length=os.fstat(stream.fileno()).st_size)
         try:
             _try_out(stream, row)

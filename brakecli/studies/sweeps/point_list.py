@@ -13,7 +13,7 @@ from typing import Any, TextIO
 from brakecli.case.read import key_path
 from brakecli.case.tables import entries
 from brakecli.errors import CaseError, Problem, RefusedError
-from brakecli.results.opening import opened
+from brakecli.results.opening import open_regular
 
 LARGEST = 500_000_000
 """Bytes of such a table."""
@@ -71,7 +71,7 @@ def read_listed(path: Path, source: str, at: int) -> Listed:
     Raises CaseError with the line of what is wrong, and RefusedError where there are too many.
     """
     try:
-        with TextIOWrapper(BufferedReader(opened(path)), encoding="utf-8-sig", newline="") as file:
+        with TextIOWrapper(BufferedReader(open_regular(path)), encoding="utf-8-sig", newline="") as file:
             if os.fstat(file.fileno()).st_size > LARGEST:
                 raise OSError(f"it is larger than {LARGEST} bytes")
             return _points(_rows(file, str(path)), str(path))
