@@ -171,9 +171,9 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
         share = f"{100.0 * under.squeal_probability:.3g} % (95 %: {interval})"
         blocks.append(Row(f"squeal under a scatter {report.scatter}", share, detail=True))
     if report.thresholds.coexists_from is not None:
-        blocks.append(Row("can vibrate from", show.text(report.thresholds.coexists_from)))
+        blocks += details(Row("can vibrate from", show.text(report.thresholds.coexists_from)))
     if report.thresholds.barrier is not None:
-        blocks.append(Row("barrier", show.text(report.thresholds.barrier, "m")))
+        blocks += details(Row("barrier", show.text(report.thresholds.barrier, "m")))
     notes = report.notes()
     blocks += [Row("note", each) for each in notes]
     if check:
@@ -183,8 +183,7 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
     if changes := _ordered([each for each in report.advice if each.to is not None], report.mildest):
         apart = report.mildest not in (None, changes[0].parameter)
         first = max(SHORT_ADVICE - len(notes), 1 + apart)  # a short answer has twelve lines; a note takes one
-        ranking = report.ranking + "; second, what leaves least squeal" * apart
-        blocks.append(Table(_advice(changes, report.squeal), ranking, first=first))
+        blocks.append(Table(_advice(changes, report.squeal), report.ranking, first=first))
     if vain := [each for each in report.advice if each.to is None]:
         blocks.append(Table(_without_help(vain), "No help within bounds", first=0))
     if moves := _moves(report):
@@ -209,7 +208,7 @@ def _without_help(changes: Sequence[Change]) -> dict[str, list[str]]:
 def _advice(changes: Sequence[Change], drawn: Left | None) -> dict[str, list[str]]:
     columns = {
         "what helps": [each.parameter for each in changes],
-        "from": [text_of(each.start) for each in changes],
+        "from": [text_of(each.start, form=".4g") for each in changes],
         "to": [each.rounded for each in changes],
         "critical φ": [text_of(each.critical_friction, form=".4g") for each in changes],
         "safe until": [_until(each) for each in changes],

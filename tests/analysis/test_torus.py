@@ -32,7 +32,8 @@ def logistic(growth: float) -> NDArray[np.float64]:
 def on_circle(number: int, count: int = 1000) -> Any:
     """cos 2πθ of a circle map of a free rotation, and that: by the distance covered in a long time."""
     rng = np.random.default_rng(number)
-    turn, force = rng.uniform(0.05, 0.45), rng.uniform(0.0, 0.7)
+    turn = rng.uniform(0.05, 0.45)
+    force = rng.uniform(0.0, 0.7)
     phase = values(lambda at: at + turn + force / (2.0 * math.pi) * math.sin(2.0 * math.pi * at), count=100_000)
     return np.cos(2.0 * math.pi * phase[:count]), (phase[-1] - phase[0]) / (len(phase) - 1)
 

@@ -68,7 +68,7 @@ def test_the_table_fits_into_eighty_columns_and_ends_in_a_sentence(monkeypatch: 
     assert max(map(len, table.splitlines())) <= 80
     for words in (
         "link2.angle_deg 5 7.692 0.84 89.99 damped",
-        "Confirmed by a run, smallest change first (by ratio; angles in radians): what helps",
+        "Confirmed by a run, smallest ratio (or rad) first: what helps",
         "No help within bounds: no help from none in load.force 5000 500 to 5e+04",
     ):
         assert words in " ".join(table.split())

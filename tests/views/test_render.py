@@ -64,7 +64,9 @@ def test_numbers_of_the_terminal_have_the_form_that_is_asked_for() -> None:
 
 def test_what_is_rounding_of_steady_sliding_is_shown_as_0() -> None:
     """A spring of c under the force F: the energy F²/2c and the displacement F/c."""
-    force, stiffness, lever = 900.0, 1.6e8, 0.5
+    force = 900.0
+    stiffness = 1.6e8
+    lever = 0.5
     numbers = {
         "mean_friction_force": force,
         "braking_torque": lever * force,

@@ -33,7 +33,7 @@ _DECAYED_SAMPLES = 100_000
 """Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
 _TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
 _ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
-SMALLEST = "smallest change first (by ratio; angles in radians)"
+SMALLEST = "smallest ratio (or rad)"
 """In which order changes stand."""
 _PRESSED_PART = 0.5  # of the load: where less presses the shoe on, the links carry more of it than the pad
 
@@ -65,7 +65,7 @@ class AdviceReport:
     left_out: str = ""  # what was not asked, as it takes too long
     squeal: Left | None = None  # of the case itself, under scatter
     scatter: str = ""  # which one, in words
-    ranking: str = f"Confirmed by a run, {SMALLEST}"
+    ranking: str = f"Confirmed by a run, {SMALLEST} first"
     band: tuple[float, ...] | None = None  # Hz, between which squeal counts under scatter; any where None
     elsewhere: str = ""  # what is said of brakes that are unstable, but do not squeal there
     helpful: Sequence[str] = ()  # keys whose change surely lowers what is unstable under scatter
@@ -163,8 +163,7 @@ class AdviceReport:
         there = f"between {self.band[0]:g} and {self.band[1]:g} Hz" if self.band and those else "in that band"
         said = f"{part_of(left)}{those} squeal" + f" {there}" * (self.band is not None)
         beside = left.unstable_elsewhere or 0.0
-        shown = self.band is not None or beside > 0.0
-        return f"{said}, and {percent(beside)} {self.elsewhere}" if self.elsewhere and shown else said
+        return f"{said}, and {percent(beside)} {self.elsewhere}" if self.elsewhere and beside > 0.0 else said
 
     def _remedy(self) -> Iterator[str]:
         if not self.advice:

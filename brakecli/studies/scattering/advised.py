@@ -106,7 +106,13 @@ def _squeal(case: Case) -> Left | None:
     if frequencies is None:
         return None
     hits = frequencies > 0.0
-    return Left(*Probability.of(hits), squeal_frequency=_median(frequencies[hits]), unstable=hits)
+    return _of_samples(hits, squeal_frequency=_median(frequencies[hits]), unstable=hits)
+
+
+def _of_samples(hits: NDArray[np.bool_], **more: Any) -> Left:
+    """What samples say of squeal, some of which are hits."""
+    share = Probability.of(hits)
+    return Left(squeal_probability=share.value, squeal_lower=share.lower, squeal_upper=share.upper, **more)
 
 
 def _median(values: Floats) -> float | None:
@@ -190,8 +196,12 @@ def under_scatter(
         beside = elsewhere(study, columns)
         unstable = (hits | beside).reshape(values.shape[:2])
         frequencies = columns["frequency"][(hits | beside) & (columns["frequency"] > 0.0)]
-        share = Probability.of(hits.reshape(values.shape[:2]))
-        return Left(*share, float(beside.mean()), _median(frequencies), unstable)
+        return _of_samples(
+            hits.reshape(values.shape[:2]),
+            unstable_elsewhere=float(beside.mean()),
+            squeal_frequency=_median(frequencies),
+            unstable=unstable,
+        )
 
     advice = [
         replace(change, squeal=squeal_of(change) if change.to is not None else None) for change in report.advice
@@ -201,7 +211,7 @@ def under_scatter(
     return replace(
         with_squeal,
         advice=helpful + [change for change in advice if change.parameter not in with_squeal.helpful],
-        ranking=f"Least instability under the study's scatter first; of what it does not tell apart, {SMALLEST}",
+        ranking=f"Least instability first, then {SMALLEST}",
         band=study.band,
         elsewhere=ELSEWHERE[study.band is not None],
     )

@@ -102,7 +102,7 @@ def test_the_short_table_has_the_smallest_change_and_what_leaves_least_squeal() 
     assert drawn.squeal_probability > 2.0 * shares_left(mildest)
     assert shares_left(mildest) < shares_left(by_share[0]) + 0.01
     short = " ".join(terminal_text(of_advice(report, TERMINAL)).split())
-    assert f"second, what leaves least squeal (2 of {len(by_share)}; all: --details):" in short
+    assert f"smallest ratio (or rad) first (2 of {len(by_share)}; all: --details):" in short
     rows = short.partition("squeals")[2]
     assert rows.index(report.advice[0].parameter) < rows.index(mildest.parameter)
     assert f"{mildest.parameter} → {mildest.rounded} leaves least" in report.conclusion

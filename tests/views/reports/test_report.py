@@ -294,12 +294,12 @@ def test_three_results_stand_side_by_side_with_their_changes_against_the_first(
     for squeal, friction in zip(told["squeal under a scatter"][1], (0.6, 0.3, 0.75), strict=False):
         hits = squealing(parse_case(TINY, "case", [f"friction.coefficient={friction}"]).case)
         assert hits is not None
-        assert squeal.endswith("\u00a0%")
-        assert float(squeal.rstrip("\u00a0%")) == pytest.approx(100.0 * hits.mean(), rel=1e-3)
+        assert squeal.endswith(" %")
+        assert float(squeal.rstrip(" %")) == pytest.approx(100.0 * hits.mean(), rel=1e-3)
     assert all(len({*cells[:3]}) > 1 for name, (_, cells) in told.items() if name)  # what is the same is no news
     long = reported(*(tmp_path / f"{name}.h5" for name in "abc"))
     assert len(long.named("article")) == 4
-    assert (False, ["lost contact", "0", "0", "0", "same", "same"]) in rows(long.html)
+    assert (False, ["lost contact", "0 %", "0 %", "0 %", "same", "same"]) in rows(long.html)
 
 
 def test_the_better_design_is_named_by_its_margin_and_by_its_squeal_under_a_scatter() -> None:
@@ -336,7 +336,9 @@ def test_the_better_design_is_named_by_its_margin_and_by_its_squeal_under_a_scat
 
 
 def test_of_two_studies_the_better_one_is_named_where_their_intervals_do_not_meet() -> None:
-    often, near, seldom = (0.138, 0.133, 0.142), (0.145, 0.14, 0.15), (0.011, 0.008, 0.013)
+    often = (0.138, 0.133, 0.142)
+    near = (0.145, 0.14, 0.15)
+    seldom = (0.011, 0.008, 0.013)
     assert of_several.seldom_of({"A": often, "B": seldom}) == (
         "B is better against squeal: 13.8 % (13.3 to 14.2 %) of A and 1.1 % (0.8 to 1.3 %) of B squeal."
     )
