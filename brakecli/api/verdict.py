@@ -12,6 +12,7 @@ from brakecli.api.records import Classify
 from brakecli.api.values import chosen_of
 from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 from brakecli.faces import argument
+from brakecli.results.opening import is_hdf5
 
 _GONE = {
     "decayed_to": "what becomes of the motion is computed",
@@ -45,8 +46,10 @@ def _on_result(source: str, thresholds: list[str] | None) -> dict[str, Any]:
         raise
     except UnreadableResultError as error:
         remedy = f"for a measured signal, state with {argument('quantity')} what was measured"
-        first, _, rest = str(error).rpartition("; ")
-        raise UnreadableResultError(f"{first or rest}; {remedy}{f'; or {rest}' if first else ''}") from error
+        problem, _, otherwise = str(error).rpartition("; ")
+        if is_hdf5(Path(source)) or not problem:
+            raise UnreadableResultError(f"{error}; {remedy}") from error
+        raise UnreadableResultError(f"{problem}; {remedy}; or {otherwise}") from error
 
 
 def changed(thresholds: type[Any], changes: list[str] | None) -> Any:

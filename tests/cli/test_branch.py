@@ -497,16 +497,16 @@ BEGINNING = """
 import os, signal, threading
 from brakecli.analysis.branches import forced
 
-grown = forced.Forced.grown
+grow = forced.Forced.grow
 
 def interrupted(*arguments):
     os.kill(os.getpid(), signal.SIGTERM)
     timer = threading.Timer(20.0, os._exit, [9])
     timer.daemon = True
     timer.start()
-    return grown(*arguments)
+    return grow(*arguments)
 
-forced.Forced.grown = interrupted
+forced.Forced.grow = interrupted
 from brakecli.__main__ import main
 main()
 """

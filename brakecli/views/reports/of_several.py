@@ -109,7 +109,7 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
 def _told(rows: Sequence[tuple[Any, ...]], side: int) -> str:
     """The changed keys of one result with their values; both ends of a range together."""
     said = list[str]()
-    for row, after in zip(rows, [*rows[1:], ("",)], strict=True):
+    for row, after in zip(rows, [*rows, ("",)][1:], strict=True):
         value = shown(row[side], row[-1])
         key, _, end = row[0].rpartition(", ")
         if end == "low" and after[0] == f"{key}, high":

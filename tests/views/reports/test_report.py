@@ -250,7 +250,7 @@ def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
     found = {cells[0]: (marked, cells[1:]) for marked, cells in rows(beside)}
     assert found["friction.coefficient"] == (True, ["0.6", "0.3", "−50 %"])  # 0.3 / 0.6 - 1
     assert found["shoe.mass"] == (True, ["10 kg", "12 kg", "+20 %"])
-    assert found["lost contact"] == (False, ["0", "0", "same"])
+    assert found["lost contact"] == (False, ["0 %", "0 %", "same"])
     for number, name in enumerate("ab"):
         with open_result(tmp_path / f"{name}.h5") as stored:
             torque, regime = (stored.attributes[each] for each in ("braking_torque", "regime"))
