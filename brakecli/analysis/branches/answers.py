@@ -115,8 +115,18 @@ class Answers:
 
     @cached_property
     def _lost_at(self) -> list[float]:
-        """Where it goes on from there, and nobody knows how."""
-        return [point.p for end, point in self._cut_ends if end != RUNS_AGAIN]
+        """Where it goes on from there, and nobody knows how: no other branch passes through that motion."""
+        return [point.p for end, point in self._cut_ends if end != RUNS_AGAIN and not self._is_passed(point)]
+
+    def _is_passed(self, motion: Point) -> bool:
+        """Whether another branch of the motion that continues steady sliding passes through a motion."""
+        for followed in self.bases:
+            points = followed.branch.points if followed.branch is not None else []
+            if any(point is motion for point in points):
+                continue
+            if any(_is_same(point, motion) for point in crossing(followed, motion.p)):
+                return True
+        return False
 
     @cached_property
     def _bridges(self) -> list[Span]:
@@ -124,8 +134,7 @@ class Answers:
         return [
             (min(one.p, other.p), max(one.p, other.p))
             for (_, one), (_, other) in combinations(self._cut_ends, 2)
-            if abs(one.p - other.p) < MEET
-            and np.allclose(one.facts.state, other.facts.state, MEET, MEET * np.abs(one.facts.state).max())
+            if abs(one.p - other.p) < MEET and _is_same(one, other)
         ]
 
     @property
@@ -302,6 +311,11 @@ class Answers:
         where = f"from {begin} on" if reaches else f"from {begin} to {end}"
         what = "the motion that the waves force" if self.bases else "stable sliding"
         return [f"{where} a vibration at {frequency:.4g} Hz{self.pushed} can exist beside {what}"]
+
+
+def _is_same(one: Point, other: Point) -> bool:
+    """Whether two motions at one place have the same state."""
+    return np.allclose(one.facts.state, other.facts.state, MEET, MEET * np.abs(one.facts.state).max())
 
 
 def metres(length: float) -> str:
