@@ -121,7 +121,7 @@ TRACK = record(
     "way",  # sign of the last velocity v_x that was not 0
     "since",  # latest time of an event that is no longer kept, s
     on=int,  # 1 where the loop notes anything
-    phase=int,  # of `motion.phases`; without contact that of flight
+    phase=int,  # of `phases`; without contact that of flight
     marks=int,  # that have been made
     next=int,  # sample at which the next one is due
     events=int,  # that have been noted

@@ -4,7 +4,7 @@
 rough contact: `steps` chooses each step by its error, `between` loops over them from sample to sample, and `grid`
 takes a fixed number. Whoever fills the record (`samples`, `between`, `flow`) sets `propagator`.
 
-A propagator carries the block of a motion (`record.BLOCK`) from event to event.
+A propagator carries the block of a motion (`block.BLOCK`) from event to event.
 
 1. The motion that is reached stands in `z`, with U, Q and their slopes, in the phase `phase`, at `base` + `time`.
 2. A step lies within a phase, and between two knots of speed and load.
@@ -20,7 +20,7 @@ A propagator carries the block of a motion (`record.BLOCK`) from event to event.
     which `grid` asks itself. All is in the record, to go on to the bit. A step of `steps`, and what samples a loop
     (`samples`, `between`), return a `Failure`.
 
-A third one has a number beside `record.MATRICES`, and a record in the plant; branches in `enter_phase`, `look`
+A third one has a number beside `block.MATRICES`, and a record in the plant; branches in `enter_phase`, `look`
 and `pass_event` of `events` and in `jump` and `hold_on` of `columns`, where what is not matrices is Runge-Kutta; a
 loop as those of `advance`, `between` and `grid`, which finds its first phase; what samples it; and an entry in
 `tasks`. A case can name it once a scheme does.
