@@ -8,7 +8,6 @@ import numpy as np
 
 from brakecli.analysis.branches.bar import Bound
 from brakecli.analysis.branches.explore import Explored, crossing, span
-from brakecli.analysis.branches.follow import RUNS_AGAIN
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.point import End, Point
 from brakecli.analysis.branches.rows import FORCED, SLIDING, Followed, Mark
@@ -115,8 +114,9 @@ class Answers:
 
     @cached_property
     def _lost_at(self) -> list[float]:
-        """Where it goes on from there, and nobody knows how: no other branch passes through that motion."""
-        return [point.p for end, point in self._cut_ends if end != RUNS_AGAIN and not self._is_passed(point)]
+        """Where it goes on, and nobody knows how: no branch passes through that motion, or none was followed."""
+        cut = [point.p for _, point in self._cut_ends if not self._is_passed(point)]
+        return cut + self.explored.unfollowed
 
     def _is_passed(self, motion: Point) -> bool:
         """Whether another branch of the motion that continues steady sliding passes through a motion."""

@@ -1,6 +1,7 @@
 """Whether a branch has come back: to its first point, or over itself."""
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -44,24 +45,25 @@ def turned_back(points: list[Point], new: Point, border: float) -> bool:
     return False
 
 
-def find_passed(points: list[Point]) -> list[Point]:
-    """The earlier point, if any, that the last stride passes on its way along the same stretch of the branch.
+def find_passed(points: Sequence[Point], here: Point, new: Point) -> list[Point]:
+    """The nearest of these points, if any, that a stride passes on its way along their stretch of a branch.
 
-    Newton's method may go over to another branch where two cross. Then a closed one is entered, and its first
-    point is not that of the walk.
+    Newton's method may go over to another branch where two cross, or nearly meet. Then it may be one that has
+    been followed, or a closed one is entered, whose first point is not that of the walk.
     """
-    here, new = points[-2:]
+    chord = new.z - here.z
     way = new.s - here.s
     beside = [
         point
-        for point in points[1:-LEAST_LOOP]
+        for point in points
         if abs(point.p - new.p) <= way
         and point.chart is new.chart
         and point.word == new.word
-        and float(point.tangent @ new.tangent) > SHARP
+        and abs(float(point.tangent @ new.tangent)) > SHARP
         and float(np.abs(point.z - new.z).max()) <= way
+        and 0.0 <= float(chord @ (point.z - here.z)) <= float(chord @ chord)
     ]
-    return beside[-1:]
+    return sorted(beside, key=lambda point: float(np.abs(point.z - new.z).max()))[:1]
 
 
 def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Point | None, End | None]:

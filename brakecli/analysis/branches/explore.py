@@ -16,14 +16,14 @@ from brakecli.analysis.branches.forced import MOST_PERIODS, Forced
 from brakecli.analysis.branches.islands import PARTS, Search, places, try_pushes
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.newton import LEFT, OFF, Newton, Settings
-from brakecli.analysis.branches.point import Point, cubic
+from brakecli.analysis.branches.point import Branch, Point, cubic
 from brakecli.analysis.branches.problem import Array, Problem
 from brakecli.analysis.branches.rough_cycles import RoughCycles
 from brakecli.analysis.branches.rows import FORCED, IN_SLIDING, LIMIT_CYCLE, Followed, Mark, of_branch, of_sliding
 from brakecli.analysis.branches.sliding import Change, Slide, Sliding
 from brakecli.analysis.branches.stable_parts import unstable_spans
 from brakecli.analysis.branches.starts import settle
-from brakecli.analysis.branches.switch import switch
+from brakecli.analysis.branches.switch import crossing_sheet, switch
 from brakecli.analysis.stability.modes import is_undamped
 from brakecli.analysis.stability.search import bisect
 from brakecli.errors import CaseError
@@ -68,6 +68,7 @@ class Explored:
     notes: list[str]
     interrupted: bool = False
     search: Search = field(default_factory=Search)
+    unfollowed: list[float] = field(default_factory=list)  # places of motions beside branches, by the budget
 
 
 Tell = Callable[[str, int, int], None]
@@ -103,6 +104,7 @@ class Explorer:
         self.branches: list[Followed] = []
         self.notes: list[str] = []
         self.search = Search()
+        self.unfollowed: list[float] = []
         self.waves = None if line.case.roughness.wheel is None else self._waves()
 
     def explore(
@@ -138,6 +140,7 @@ class Explorer:
             notes=[*self.notes],
             interrupted=bool(self.stop()),
             search=self.search,
+            unfollowed=[*self.unfollowed],
         )
 
     def begin_at(self, p: float, state: Any) -> None:
@@ -160,13 +163,24 @@ class Explorer:
         changes: Sequence[Change] = (),
     ) -> None:
         """Follow the branch of a motion along its tangent, or both ways if it lies `within` it."""
-        how = self._settings(), self._until(problem, first), self.stop
+        how = self._settings(), self._until(problem, first), self.stop, self._known(problem)
         branch = both_ways(problem, first, *how) if within else follow(problem, first, None, *how)
         followed = replace(of_branch(self.line, branch, problem, kind, change, changes), note=note)
         self.branches.append(replace(followed, unstable=cache(partial(self._unstable, followed))))
-        for other in branch.aside:
-            if not (self._over() or any(passes(followed, other) for followed in self.branches)):
+        for other in [*branch.aside, *(crossed(problem, branch) if kind == FORCED else [])]:
+            if any(passes(followed, other) for followed in self.branches):
+                continue
+            if self._over():
+                self.unfollowed.append(other.p)
+                value = self.line.value(other.p)
+                self.notes.append(f"a motion beside a branch at {value:.6g} was not followed any more")
+            else:
                 self._follow(problem, other, kind, note, within=True)
+
+    def _known(self, problem: Problem) -> list[Point]:
+        """The points of the branches of a problem."""
+        same = [followed.branch for followed in self.branches if followed.problem is problem]
+        return [point for branch in same if branch is not None for point in branch.points]
 
     def _unstable(self, followed: Followed) -> list[tuple[float, float]]:
         return [(self.line.value(low), self.line.value(high)) for low, high in unstable_spans(followed)]
@@ -338,6 +352,18 @@ def span(followed: Followed) -> tuple[float, float]:
     assert branch is not None
     places = [point.p for point in branch.points] + [special.p for special in branch.specials]
     return min(places), max(places)
+
+
+def crossed(problem: Problem, branch: Branch) -> list[Point]:
+    """Motions of the sheets that a branch crosses at its branch points."""
+    newton = Newton(problem, Settings())
+    motions: list[Point] = []
+    for special in branch.specials:
+        if special.kind == "branch point":
+            before = max((point for point in branch.points if point.s < special.s), key=lambda point: point.s)
+            after = min((point for point in branch.points if point.s > special.s), key=lambda point: point.s)
+            motions += crossing_sheet(newton, special.point, after.z - before.z)
+    return motions
 
 
 def lies_on(followed: Followed, motion: Point) -> bool:

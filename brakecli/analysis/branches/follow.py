@@ -1,7 +1,7 @@
 """Follow a branch: predictor, corrector, length of stride, corners at borders, and why it ends."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
 
@@ -20,7 +20,8 @@ Stop = Callable[[], bool]
 """Called before each stride; True ends the branch with the points found so far."""
 
 HALVED = End("halved", "it reaches the motion of half its period")
-RUNS_AGAIN = End("lost", "it is lost: it runs along itself again")
+MET_ITSELF = End("met", "it reaches motions of its own again")
+MET_ANOTHER = End("met", "it reaches motions of a branch that is followed")
 
 
 @dataclass(frozen=True)
@@ -67,13 +68,16 @@ def follow(
     settings: Settings | None = None,
     until: Until | None = None,
     stop: Stop | None = None,
+    known: Sequence[Point] = (),
 ) -> Branch:
     """Follow a branch from a first point, and locate its special points.
+
+    It ends where it comes along `known` points, which are those of branches of the same problem.
 
     With sign 1 it is followed towards larger p, with -1 towards smaller p, and with None along the tangent of the
     first point. Where the first tangent is vertical, 1 means along it and -1 against it.
     """
-    walk = _Walk(problem, settings or Settings(), until, stop)
+    walk = _Walk(problem, settings or Settings(), until, stop, known)
     points, end = walk.follow(first if sign is None else _direct(first, sign))
     return _finish(walk, points, (End("start", "the branch was begun here"), end))
 
@@ -84,13 +88,14 @@ def both_ways(
     settings: Settings | None = None,
     until: Until | None = None,
     stop: Stop | None = None,
+    known: Sequence[Point] = (),
 ) -> Branch:
     """Follow a branch from a point within it both ways, as one branch with s = 0 at that point."""
-    walk = _Walk(problem, settings or Settings(), until, stop)
+    walk = _Walk(problem, settings or Settings(), until, stop, known)
     points, end = walk.follow(_direct(first, 1.0))
     begin = end
     if end.kind != "closed":
-        back, begin = walk.follow(_direct(first, -1.0))
+        back, begin = walk.follow(_direct(first, -1.0), points[LEAST_LOOP:])
         points = [point.turned() for point in back[:0:-1]] + points
     return _finish(walk, points, (begin, end))
 
@@ -105,7 +110,7 @@ def _finish(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branc
     specials, unsearched = special_points(walk.newton, points, walk.over)
     for point, end in ((points[0], ended[0]), (points[-1], ended[1])):
         if end.kind != "start":
-            error = 0.0 if end.kind in ("range", "closed", "stopped") else walk.settings.shortest
+            error = 0.0 if end.kind in ("range", "closed", "met", "stopped") else walk.settings.shortest
             if end.kind == "halved":  # there one multiplier is 1
                 specials = [
                     each
@@ -121,11 +126,19 @@ def _finish(walk: "_Walk", points: list[Point], ended: tuple[End, End]) -> Branc
 class _Walk:
     """The walk along one branch, with its budgets."""
 
-    def __init__(self, problem: Problem, settings: Settings, until: Until | None, stop: Stop | None) -> None:
+    def __init__(
+        self,
+        problem: Problem,
+        settings: Settings,
+        until: Until | None,
+        stop: Stop | None,
+        known: Sequence[Point],
+    ) -> None:
         self.problem = problem
         self.settings = settings
         self.until = until
         self.stop = stop
+        self.known = known
         self.newton = Newton(problem, settings)
         self.deadline = perf_counter() + settings.seconds
         self.count = 0
@@ -139,8 +152,8 @@ class _Walk:
             return End("seconds", f"the budget of {self.settings.seconds:g} s is spent")
         return None
 
-    def follow(self, first: Point) -> tuple[list[Point], End]:
-        """The points in one direction, and why they end."""
+    def follow(self, first: Point, other_way: Sequence[Point] = ()) -> tuple[list[Point], End]:
+        """The points in one direction, and why they end; `other_way` are those of the other direction, if any."""
         settings = self.settings
         points = [first]
         stride = self.settings.first
@@ -193,12 +206,22 @@ class _Walk:
                 if end is not None:
                     points[-1:] = [last] if last is not None else []
                     return points, end
-                self.problem.use(new.chart)
-                if any(closing(self.newton, earlier, here, new)[0] for earlier in find_passed(points)):
-                    return points, RUNS_AGAIN
+                if self._passes([*other_way, *points[1:-LEAST_LOOP]], here, new):
+                    return points, MET_ITSELF
+                if self._passes(self.known, here, new):
+                    return points, MET_ANOTHER
                 self.problem.use(new.chart)
             if (renewed := self._renewed(new)) is not None:
                 points.append(renewed)
+
+    def _passes(self, points: Sequence[Point], here: Point, new: Point) -> bool:
+        """Whether a stride leads over one of these points, either way."""
+        for point in find_passed(points, here, new):
+            self.problem.use(new.chart)
+            crossing, end = closing(self.newton, point, here, new)
+            if crossing is not None or end is not None:
+                return True
+        return False
 
     def _to_half(self, here: Point, new: Point) -> float | None:
         """How far ahead of a point the branch meets the motion of half the period; None if not in this stride.

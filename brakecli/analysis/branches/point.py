@@ -72,7 +72,7 @@ class End(NamedTuple):
     """Why a branch ends."""
 
     kind: str
-    """range, closed, halved, lost, stopped, points, seconds, interrupted, or start, where it was begun."""
+    """range, closed, met, halved, lost, stopped, points, seconds, interrupted, or start, where it was begun."""
     reason: str
     """For a reader."""
 

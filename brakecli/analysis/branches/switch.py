@@ -1,4 +1,4 @@
-"""From a flip to the motion of twice the period that is born there."""
+"""From a flip to the motion of twice the period that is born there, and from a branch point to what crosses it."""
 
 import math
 
@@ -11,6 +11,10 @@ from brakecli.analysis.branches.problem import Array, Doubled
 
 DISTANCES: tuple[float, ...] = 1e-2, 3e-3, 1e-3, 3e-4
 """Distances from the flip at which the doubled motion is sought."""
+
+
+OBLIQUE = 4.0
+"""Distances along a branch, over that across it, within which a sheet that crosses it is sought; a choice."""
 
 
 def flipped(point: Point) -> Array:
@@ -38,3 +42,28 @@ def switch(problem: Doubled, point: Point, settings: Settings | None = None) -> 
             if math.sqrt(off @ off) < LEFT * distance:
                 return new
     return None
+
+
+def crossing_sheet(newton: Newton, point: Point, way: Array) -> list[Point]:
+    """First points on both sides of a branch, of the sheet that crosses it at a branch point, or nearly does.
+
+    At a branch point the derivative by unknowns and parameter has two null vectors; of sheets that nearly meet
+    the second one is nearly null. A plane across the `way` of the branch, at a distance, holds one motion near
+    by: the other sheet's. That way is told by the neighbours, as the tangent turns where sheets nearly meet.
+    """
+    newton.problem.use(point.chart)
+    evaluation = newton.evaluate(point.z, True)
+    if evaluation is None or evaluation.by_p is None:
+        return []
+    nearly_null = np.linalg.svd(np.column_stack([evaluation.by_u, evaluation.by_p]))[2][-2:]
+    across = nearly_null.T @ np.array([-(nearly_null[1] @ way), nearly_null[0] @ way])
+    across /= math.sqrt(across @ across)
+    sheet: list[Point] = []
+    for onward in (across, -across):
+        for distance in DISTANCES:
+            guess = point.z + distance * onward
+            new = newton.solve(guess, onward, onward, 0.0, exact=True, most=FROM_AFAR)
+            if new is not None and new.word == point.word and np.abs(new.z - guess).max() < OBLIQUE * distance:
+                sheet.append(new)
+                break
+    return sheet

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.branches.explore import passes
-from brakecli.analysis.branches.follow import both_ways, follow
+from brakecli.analysis.branches.explore import crossed, passes
+from brakecli.analysis.branches.follow import MET_ANOTHER, both_ways, follow
 from brakecli.analysis.branches.newton import Newton, Settings, start
 from brakecli.analysis.branches.point import Branch, Special
 from brakecli.analysis.branches.switch import switch
@@ -63,6 +63,11 @@ def test_a_transcritical_point_is_a_branch_point_of_both_branches() -> None:
         point = branch.specials[0]
         assert abs(point.p - 0.4) < 1e-6
         assert not point.turns
+        beside = crossed(problem, branch)
+        assert len(beside) == 2
+        for motion in beside:  # on the other one, near by
+            assert motion.u[0] == pytest.approx(motion.p - 0.4 if u == 0.0 else 0.0, abs=1e-12)
+            assert 0.0 < abs(motion.p - 0.4) < 0.05
 
 
 def test_a_pitchfork_is_a_branch_point_of_both_branches() -> None:
@@ -87,6 +92,31 @@ def nearly_met(gap: float) -> Roots:
         lambda u, p: [[p - 0.4 - 3.0 * u[0] ** 2]],
         lambda u, p: [u[0]],
     )
+
+
+def test_the_sheets_that_a_branch_crosses_or_nearly_meets_are_found_on_both_sides() -> None:
+    """A gap that is far narrower than the step over it: the walk goes on straight, and finds what lies aside."""
+    for gap in (0.0, 1e-9, -1e-9):
+        problem = nearly_met(gap)
+        branch = follow(problem, first_of(problem, [0.0], 0.1))
+        followed: Any = SimpleNamespace(branch=branch, problem=problem)
+        assert kinds(branch)[0] == "branch point"
+        beside = crossed(problem, branch)
+        assert sorted(math.copysign(1.0, motion.u[0]) for motion in beside) == [-1.0, 1.0]
+        for motion in beside:
+            assert motion.p == pytest.approx(0.4 + motion.u[0] ** 2 - gap / motion.u[0], abs=1e-9)
+            assert not passes(followed, motion)
+
+
+def test_a_branch_ends_where_it_comes_along_one_that_is_followed() -> None:
+    problem = parabola(0.3)
+    known = both_ways(problem, first_of(problem, [0.5], 0.55)).points
+    for sign in (1.0, -1.0):
+        branch = follow(problem, first_of(problem, [0.2], 0.34), sign, known=known)
+        assert branch.ended[1] == MET_ANOTHER
+        assert len(branch.points) < 20
+    other = parabola(0.2)
+    assert follow(other, first_of(other, [0.2], 0.24), known=known).ended[1].kind == "range"
 
 
 @pytest.mark.parametrize("gap", [1e-5, -1e-5, 1e-4, 1e-3])

@@ -171,39 +171,59 @@ def test_the_windows_of_a_shoe_are_those_of_another_integrator(name: str) -> Non
 def test_rounding_moves_no_end_of_a_window_by_more_than_the_bars(part: float) -> None:
     """A shoe that bounces, and the same with a change of its mass that is rounding, have the same ends.
 
-    Sheets nearly meet at 3.452 and 3.464 MN/m; between them two motions are stable, see below.
+    Sheets nearly meet at 3.376, 3.383, 3.452 and 3.464 MN/m. So a walk follows a sheet, or crosses it, by
+    rounding; what it crosses is followed as well. One of these alone is stable from 3.06749 to 3.06769 MN/m, see
+    below.
     """
     shoe = SHOES["doubling"]
     changed = {**shoe["case"], "shoe": {"mass": shoe["case"]["shoe"]["mass"] * (1.0 + part)}}
     key = shoe["key"].replace(".", "__")
     one, other = (listed_ends(case, key, shoe["range"])[0] for case in (shoe["case"], changed))
     errors = np.array(one.window_errors) + np.array(other.window_errors)
-    assert np.shape(one.windows) == np.shape(other.windows) == (1, 2)
+    assert np.shape(one.windows) == np.shape(other.windows) == (2, 2)
     assert np.all(np.abs(np.array(one.windows) - np.array(other.windows)) <= errors)
 
 
 @campaign
-def test_motions_of_all_sheets_between_those_that_nearly_meet_last() -> None:
+@pytest.mark.parametrize(("value", "number"), [(3.457e6, 2), (3.06759e6, 1)])
+def test_motions_of_all_sheets_where_those_nearly_meet_last(value: float, number: int) -> None:
     """So says the exact contact, in steps to 1e-9 over 600 periods: no window lies there."""
     shoe = SHOES["doubling"]
     lower, upper = shoe["range"]
     critical = Critical(parameter=shoe["key"], lower=lower, upper=upper)
     changed = make(shoe["case"], **{shoe["key"].replace(".", "__"): lower})
     answers = Answers(explored(critical, changed).explored, None)
-    states = calm(answers, 3.457e6)
-    system = answers.line.system(answers.line.place(3.457e6))
+    states = calm(answers, value)
+    assert len(states) >= number
+    system = answers.line.system(answers.line.place(value))
     method = Method("event-driven", tolerance=1e-9, automatic=True, evaluator="exact")
     period = common_period(system)
     assert period is not None
     places = list[float]()
-    for state in states[:2]:
+    for state in states[:number]:
         x, y, vx, vy = state.tolist()
         begun = replace(system, initial=Initial(x=x, y=y, vx=vx, vy=vy), method=method)
         rows = solve(replace(begun, duration=600.0 * period, interval=period / 640.0)).rows[:, :4]
-        assert rows[640 * 599] == pytest.approx(rows[0], rel=1e-3)  # of a motion between points, by a cubic
-        assert rows[640 * 599] == pytest.approx(rows[640 * 100], rel=1e-5)
+        # the branch has it of cells, and between points by a cubic
+        assert np.all(np.abs(rows[640 * 599] - rows[0]) <= 1e-3 * np.abs(rows).max(axis=0))
+        assert rows[640 * 599] == pytest.approx(rows[640 * 300], rel=1e-5)
         places.append(x)
-    assert abs(places[0] - places[1]) > 0.2 * abs(places[0])
+    if number > 1:
+        assert abs(places[0] - places[1]) > 0.2 * abs(places[0])
+
+
+def test_nothing_is_claimed_of_a_window_in_which_a_sheet_was_not_followed() -> None:
+    """A motion beside a branch, for which no budget was left."""
+    shoe = SHOES["resonance"]
+    low, high = shoe["range"]
+    critical = Critical(parameter=shoe["key"], lower=low, upper=high)
+    whole = explored(critical, make(shoe["case"])).explored
+    (window,) = Answers(whole, None).windows
+    assert window[0].known
+    middle = 0.5 * (window[0].p + window[1].p)
+    cut = Answers(replace(whole, unfollowed=[middle]), None)
+    assert not cut.windows[0][0].known
+    assert on_waves(critical, cut).outcome is Outcome.UNDECIDED
 
 
 def test_a_window_or_gap_narrower_than_both_its_bars_is_none() -> None:
