@@ -19,12 +19,6 @@ from brakecli.stop import signalled
 MOST_STEPS = 5_000_000
 """Steps of a motion on smooth pads after which it is given up: about half a second."""
 
-NEARS = 1.0
-"""Powers of e by which a disturbance of unstable sliding may grow without an event, of a motion that nears it."""
-
-AHEAD = 10_000
-"""Steps without an event, at least, of such a motion."""
-
 
 class Kind(StrEnum):
     """What a motion comes to.
@@ -123,8 +117,9 @@ def fate_on_smooth_pads(
     except np.linalg.LinAlgError:  # modes that are alike
         return Fate(Kind.UNKNOWN)
     while motion.steps < MOST_STEPS and motion.time < within and not signalled():
-        if rate > 0.0 and until is None:  # a disturbance grows slowly
-            motion.way.duration = motion.time + max(NEARS / rate, AHEAD * motion.path.h)
+        if rate > 0.0 and until is None:
+            # a motion without events nears sliding for as long as a disturbance grows by a factor of e
+            motion.way.duration = motion.time + max(1.0 / rate, 10_000 * motion.path.h)
         outcome = motion.seek()
         if outcome == LINEAR:
             kind = Kind.UNKNOWN if rate > 0.0 else Kind.STEADY_SLIDING

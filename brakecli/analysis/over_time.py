@@ -13,15 +13,7 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import value_at, values
 from brakecli.solver.system import System
 
-CYCLES = 20.0  # of the lower natural frequency in a window
-SHORTEST = 2.0  # cycles in a quarter of a window, without which nothing is said
-# without overlap; windows overlap by three quarters
-FEWEST_WINDOWS = 8
-MOST_WINDOWS = 100
-HIGHEST = 10.0  # times the higher natural frequency: up to here spectra are kept
-LINES = 1024  # most of a short-time spectrum; neighbours are averaged
 LOUD = 0.05  # part of the largest amplitude of vx from which it vibrates
-QUIET = 0.01  # part of the static compression below which the largest amplitude of x is no vibration
 _HOPS = 4  # in a window
 _AT_ONCE = 16  # windows, so that memory does not grow with the run
 
@@ -57,10 +49,11 @@ def over_time(history: History, system: System) -> OverTime | None:
     """What the windows of a history show; None where speed and load are constant, or samples are too few."""
     lowest, highest = system.natural_frequencies
     duration = (history.samples - 1) * history.interval
-    window = min(max(CYCLES / max(lowest, 1e-9), duration / MOST_WINDOWS), duration / FEWEST_WINDOWS)
+    # cycles in a window, and most and fewest windows without overlap; they overlap by three quarters
+    window = min(max(20.0 / max(lowest, 1e-9), duration / 100), duration / 8)
     hop = round(window / (_HOPS * history.interval))
     count = history.samples // max(hop, 1) - _HOPS + 1
-    few = hop < _HOPS or hop * history.interval * lowest < SHORTEST
+    few = hop < _HOPS or hop * history.interval * lowest < 2.0  # cycles
     if system.steady or few or count < 1:
         return None
     frequency, density = _spectra(history, hop, count)
@@ -68,12 +61,13 @@ def over_time(history: History, system: System) -> OverTime | None:
     speed, load = (np.array([value_at(s, t) for t in middles]) for s in (system.belt, system.load))
     amplitude, swing, stick, friction = _statistics(history, hop, count)
     pressed = float(np.abs(values(system.load)).max()) / (system.coefficients.c_yy + system.contact_stiffness)
-    loud = (swing >= LOUD * swing.max()) & (amplitude.max() > QUIET * pressed)
+    # what moves x by less than a hundredth of the compression of the pad is no vibration
+    loud = (swing >= LOUD * swing.max()) & (amplitude.max() > 0.01 * pressed)
     length = _HOPS * hop * history.interval
     peaks = [peak(frequency, row, length) if on else None for row, on in zip(density, loud, strict=True)]
     tones = np.array([math.nan if tone is None else tone for tone in peaks])
-    chosen = frequency <= HIGHEST * highest
-    group = math.ceil(chosen.sum() / LINES)
+    chosen = frequency <= 10.0 * highest
+    group = math.ceil(chosen.sum() / 1024)  # neighbours, which are averaged
     whole = chosen.sum() // group * group
     lines = frequency[:whole].reshape(-1, group).mean(axis=1)
     shown = density[:, :whole].reshape(count, -1, group).mean(axis=2)

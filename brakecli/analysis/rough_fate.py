@@ -23,19 +23,9 @@ TURNS = 0.25
 """Part of its size by which a disturbance may differ at the end from a linear one."""
 IN_A_ROW = 3
 """Spans over which a motion has to obey them: one that lasts may do so in one of them, by chance."""
-AT_CALM = 1e-9
-"""Distance from a calm motion, over the compression of the pad, that is rounding."""
-KEPT = 0.99
-"""Part of its distance from all calm motions that a vibration which lasts keeps in a time twice as long."""
-DRIFTS = 4.0
-STILL = 1e-6
-"""Standard errors of its slope beyond which that distance falls, and a fall that is none. Beside a value at which
-a vibration vanishes a motion keeps nearly all of its distance for long, but it falls steadily."""
-SETTLING = 1.0
-"""Powers of e by which the dashpots shrink a disturbance of a vibration before its distances are compared."""
 NOTICED = 0.2
-"""Powers of e by which the slowest disturbance of a calm motion fades before then. One that fades a twentieth as
-fast is seen to fade."""
+"""Powers of e by which the slowest disturbance of a calm motion fades before distances are compared. One that
+fades a twentieth as fast is seen to fade."""
 
 
 class _Span:
@@ -58,7 +48,7 @@ class _Span:
         self.weights[2, 2] = self.weights[3, 3] = c.m
         self.scales = 1.0 / np.sqrt(np.diag(self.weights))
         depth = abs(system.load_at_start) / (c.c_yy + system.contact_stiffness)
-        self.rounding = AT_CALM * depth / self.scales[1]
+        self.rounding = 1e-9 * depth / self.scales[1]
 
     def __call__(self, state: Floats, tangents: bool) -> tuple[Floats, Floats] | None:
         """The states at the ends of all parts, and the derivative of the last one; None where there is no flow."""
@@ -129,7 +119,8 @@ def lasts_on_rough_pads(
     last = np.array(state, float)
     far = list[float]()
     drawn = 0
-    spans = [SETTLING / (slowest_of_cycles(system.coefficients) * span.length)]
+    # within a quarter of the time the dashpots shrink a disturbance of a vibration by a factor of e
+    spans = [1.0 / (slowest_of_cycles(system.coefficients) * span.length)]
     spans += [NOTICED / -math.log(motion.radius) for motion in motions if 0.0 < motion.radius < 1.0]
     while motions and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < within:
         flown = span(last, False)
@@ -142,18 +133,22 @@ def lasts_on_rough_pads(
         far.append(min(motion.distance(flown[0]) for motion in motions))
         quarter, remainder = divmod(len(far), 4)
         whole = remainder == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
-        keeps = whole and max(far[2 * quarter :]) >= KEPT * max(far[quarter : 2 * quarter])
+        keeps = whole and max(far[2 * quarter :]) >= 0.99 * max(far[quarter : 2 * quarter])
         if keeps and quarter >= max(spans) and not _falls(far[quarter:]):
             return True, last, span.taken
     return None, last, span.taken
 
 
 def _falls(far: list[float]) -> bool:
-    """Whether distances fall from span to span, by a line through the logarithms of the means of eighths."""
+    """Whether distances fall from span to span, by a line through the logarithms of the means of eighths.
+
+    Beside a value at which a vibration vanishes a motion keeps nearly all of its distance for long, but it falls
+    steadily.
+    """
     means = [math.log(float(np.mean(eighth))) for eighth in np.array_split(far, min(len(far), 8))]
     places = np.arange(len(means)) - 0.5 * (len(means) - 1)
     slope = float(places @ means / (places @ places))
     square = float(places @ places)
     residual = np.array(means) - np.mean(means) - slope * places
     error = math.sqrt(float(residual @ residual) / (len(means) - 2) / square)
-    return slope < -max(DRIFTS * error, STILL / len(means))
+    return slope < -max(4.0 * error, 1e-6 / len(means))  # standard errors, and a fall that is none

@@ -72,7 +72,6 @@ _KEY = re.compile(r"((?:# )?)(\w+)( = )([^#\n]*?)( *)(#.*)?")
 _NUMBER = re.compile(r"[-+]?\b\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 _FRICTION = re.compile(r"^(coefficient = )([^#\n]*)", re.MULTILINE)
 _SCHEDULES = re.compile(r"^(?:angular_speeds|forces) =", re.MULTILINE)
-_DIGITS = 6
 
 
 class Brake(NamedTuple):
@@ -258,8 +257,8 @@ def _roughly(factors: Scales, powers: Scales, number: re.Match[str]) -> str:
 def _times(factors: Scales, powers: Scales, number: re.Match[str]) -> str:
     """A number, scaled, as TOML writes it: in six digits; of waves the factor, so that their ratios stay."""
     if powers == _POWERS["wavelengths"]:
-        return repr(float(Decimal(number[0]) * Decimal(f"{_product(factors, powers, '1'):.{_DIGITS}g}")))
-    return repr(float(f"{_product(factors, powers, number[0]):.{_DIGITS}g}"))
+        return repr(float(Decimal(number[0]) * Decimal(f"{_product(factors, powers, '1'):.6g}")))
+    return repr(float(f"{_product(factors, powers, number[0]):.6g}"))
 
 
 def _product(factors: Scales, powers: Scales, number: str) -> float:

@@ -13,8 +13,6 @@ Array = NDArray[np.float64]
 
 LONGEST_SEGMENT = 1 << 16  # samples, so that the memory that a spectrum takes does not grow with the run
 SEGMENTS_AT_ONCE = 16
-SEGMENTS_WANTED = 8
-SHORTEST_SEGMENT = 16
 FEWEST_CYCLES = 5  # of a line in the record, and bins below it: what is slower is not told from drift
 FEWEST_BINS = 3  # below a line, which otherwise is not told from the mean
 SPECTRAL = ("x", "y", "vx", "vy", "friction_force", "normal_force", "contact_fraction")
@@ -32,8 +30,8 @@ class Spectrum:
 
 
 def segment(samples: int) -> int:
-    """Samples of a segment of the spectrum of so many samples."""
-    return min(LONGEST_SEGMENT, max(min(SHORTEST_SEGMENT, samples), 2 * samples // (SEGMENTS_WANTED + 1)))
+    """Samples of a segment of the spectrum of so many samples: eight segments, where they are not too short."""
+    return min(LONGEST_SEGMENT, max(min(16, samples), 2 * samples // 9))
 
 
 def spectrum(history: History, start: int) -> Spectrum:

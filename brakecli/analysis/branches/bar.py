@@ -10,23 +10,9 @@ from brakecli.analysis.branches.follow import both_ways
 from brakecli.analysis.branches.newton import Newton, Settings, zero
 from brakecli.analysis.branches.point import Point
 
-FINER = 1.5
-"""Times as many steps, and then as many cells, with which an end is located again: errors of both may cancel."""
 LEFT_OPEN = 4.0
 """Times by which the error may exceed the change with finer steps. An error of second order is 1.8 times that
 change, but kinks of the contact force let it fall unevenly: as patches open, and where a whole pad lands."""
-KNOWN = 1e-6
-"""Least bar, in parts of the range, where steps are taken: multipliers are checked to so much."""
-STRIDES: tuple[float, ...] = 0.0, 1e-4, 1e-3, 1e-2, 5e-2
-"""Lengths by which two motions beside an end are moved apart until finer steps find it between them."""
-AROUND = Settings(points=60)
-"""How far a branch is followed with finer steps where these lengths do not hold its end."""
-ROUNDS = 24
-"""Motions that are computed to locate an end between two others."""
-LOCATED = 1e-7
-"""Change of p below which it is located."""
-NOT_ZERO = 1e-12
-"""Least size of a logarithm of a multiplier, so that it has the sign that the verdict on stability has."""
 
 
 class Bound(NamedTuple):
@@ -42,11 +28,13 @@ class Bound(NamedTuple):
     @property
     def bar(self) -> float:
         """The error of p: that of the bracket, and what steps leave open."""
-        finer = self.problem.finer(FINER) if self.inner is not None else []
+        # errors of more steps and of more cells may cancel, so the end is located again with each of them alone
+        finer = self.problem.finer(1.5) if self.inner is not None else []
         if not finer:
             return self.error
         moved = [self._moved(problem) for problem in finer]
-        return max(self.error, KNOWN) + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
+        # multipliers are checked to 1e-6, so no bar is narrower where steps are taken
+        return max(self.error, 1e-6) + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
 
     def _moved(self, finer: Any) -> float | None:
         """Where the end is with finer steps; None where it is not found."""
@@ -55,7 +43,8 @@ class Bound(NamedTuple):
         newton = Newton(finer, Settings())
         one, other = sorted((self.inner, self.beyond), key=lambda point: point.s)
         finer.use(one.chart)
-        for apart in STRIDES:
+        # two motions beside the end are moved apart until finer steps find it between them
+        for apart in (0.0, 1e-4, 1e-3, 1e-2, 5e-2):
             ends = [
                 newton.solve(
                     point.z + way * point.tangent, point.tangent, point.tangent, point.s + way, exact=True
@@ -65,7 +54,8 @@ class Bound(NamedTuple):
             if ends[0] is not None and ends[1] is not None and ends[0].stable is not ends[1].stable:
                 return locate(newton, ends[0], ends[1])
         first = newton.solve(self.inner.z, self.inner.tangent, self.inner.tangent, 0.0, exact=True)
-        points = both_ways(finer, first, AROUND).points if first is not None else []
+        # else the branch is followed some way with finer steps
+        points = both_ways(finer, first, Settings(points=60)).points if first is not None else []
         pairs = [pair for pair in pairwise(points) if pair[0].stable is not pair[1].stable]
         places = [locate(newton, *pair) for pair in pairs if pair[0].chart is pair[1].chart]
         return min(places, key=lambda p: abs(p - self.p), default=None)
@@ -81,14 +71,14 @@ def locate(newton: Newton, one: Point, other: Point) -> float:
     high = _outside(other)
     p = one.p
     side = 0
-    for turn in range(ROUNDS):
+    for turn in range(24):
         fraction = 0.5 if turn % 2 else zero(low, high)
         middle = newton.between(one, other, fraction) or newton.between(one, other, 0.5)
         if middle is None:
             break
         moved = abs(middle.p - p)
         p = middle.p
-        if moved < LOCATED:
+        if moved < 1e-7:
             return p
         if middle.stable is one.stable:
             one = middle
@@ -104,6 +94,6 @@ def locate(newton: Newton, one: Point, other: Point) -> float:
 
 
 def _outside(point: Point) -> float:
-    """ln of the largest multiplier, which is negative where a motion is stable."""
+    """ln of the largest multiplier, with the sign that the verdict on stability has: negative if it is stable."""
     size = math.log(max(float(np.abs(point.multipliers).max()), 1e-300))
-    return min(size, -NOT_ZERO) if point.stable else max(size, NOT_ZERO)
+    return min(size, -1e-12) if point.stable else max(size, 1e-12)

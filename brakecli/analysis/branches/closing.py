@@ -10,25 +10,11 @@ from brakecli.analysis.branches.point import End, Point
 
 LEAST_LOOP = 8
 """A closed branch turns by 2π, so it has more points than this: each stride turns by at most 0.7 rad."""
-RECENT = 20
-"""Points among which one is sought over which the branch runs back."""
 TURNED_BACK = End("lost", "it is lost: it has turned back on itself")
-REACH = 10.0
-"""Strides with which a border is crossed, within which a branch that runs back over itself meets a point again."""
-PASSES = 4.0
-"""Strides from the first point, beyond which a branch that crosses its plane passes elsewhere; a choice."""
-NARROWED = 7
-"""Points that bracket the crossing. A choice: what is wider then is compared all the same."""
 SHARP = 0.7
 """Cosine of the angle by which a branch turns at a sharp corner."""
 SAME_PLACE = 1e-7
 """Distance at which two points are one; corrections end at about 1e-12."""
-BRACKETED = 1e-7
-"""Length of a bracket of the crossing that is narrow enough."""
-CARRIED = 1e-4
-"""Distance at which two points are one, where the problem has carried one of them to another chart."""
-LEAST_SLOPE = 1e-3
-"""Slope dp/ds at the first point from which on p says where a branch in another chart passes it."""
 SAME_WAY = 0.999
 """Least cosine of the angle between the tangents of two points that are one."""
 
@@ -37,8 +23,10 @@ def turned_back(points: list[Point], new: Point, border: float) -> bool:
     """Whether the branch has come back across a border and runs back over itself."""
     if new.word == points[-1].word:
         return False
-    reach = REACH * border
-    for point in points[: -1 - RECENT : -1]:
+    reach = (
+        10.0 * border
+    )  # strides with which borders are crossed; a branch that runs back meets a late point again
+    for point in points[:-21:-1]:
         if point.chart is new.chart and point.word == new.word:
             chord = new.z - point.z
             return bool(math.sqrt(chord @ chord) < reach and new.tangent @ point.tangent < -SAME_WAY)
@@ -75,7 +63,7 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
     if here.chart is not new.chart or here.word != new.word or here is first:
         return None, None
     foreign = new.chart is not first.chart
-    if foreign and abs(first.tangent[-1]) < LEAST_SLOPE:
+    if foreign and abs(first.tangent[-1]) < 1e-3:
         return None, None  # the parameter alone does not say where it passes the first point
 
     def ahead(point: Point) -> float:
@@ -87,17 +75,17 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
         return None, None
     if not foreign:
         away = here.z - first.z
-        if math.sqrt(away @ away) > PASSES * (new.s - here.s):
-            return None, None
+        if math.sqrt(away @ away) > 4.0 * (new.s - here.s):
+            return None, None  # so many strides from the first point it passes elsewhere; a choice
     one = here
     other = new
-    for _ in range(NARROWED):
+    for _ in range(7):  # a choice: what is wider then is compared all the same
         low = ahead(one)
         high = ahead(other)
         middle = newton.between(one, other, zero(low, high))
         if middle is None or middle.word != here.word:
             return None, None
-        if ahead(middle) == 0.0 or other.s - one.s < BRACKETED:
+        if ahead(middle) == 0.0 or other.s - one.s < 1e-7:
             one = middle
             break
         one, other = (middle, other) if low * ahead(middle) > 0.0 else (one, middle)
@@ -117,7 +105,8 @@ def closing(newton: Newton, first: Point, here: Point, new: Point) -> tuple[Poin
     crossing = newton.solve(guess, first.tangent, onward, nearest.s, exact=True)
     if crossing is None or crossing.word != first.word:
         return None, None
-    if float(np.abs(crossing.z - guess).max()) > (CARRIED if foreign else SAME_PLACE):
+    # corrections end at about 1e-12; carrying a point to another chart is less exact
+    if float(np.abs(crossing.z - guess).max()) > (1e-4 if foreign else SAME_PLACE):
         return None, None
     if float(np.abs(crossing.z - first.z).max()) > SAME_PLACE:
         return None, None

@@ -8,13 +8,6 @@ import numpy as np
 from brakecli.analysis.branches.newton import Newton
 from brakecli.analysis.branches.point import Point
 
-REACHES: tuple[float, ...] = 1e-5, 1e-4, 1e-3, 5e-3
-"""Distances beyond a border at which the other side is looked at."""
-TRIED: tuple[float, ...] = 0.1, 1.0, 10.0
-"""Times that distance, at which a point of the other side is sought."""
-FAR = 5.0
-"""Times the length of a stride beyond a border, from which on a point belongs to another branch."""
-
 
 def beyond_corner(newton: Newton, here: Point) -> Point | None:
     """Go on beyond a border at which the branch turns sharply.
@@ -22,7 +15,7 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
     Just beyond the border the tangent of the other side is the null vector of the derivatives. Only one of its
     two directions stays on the other side.
     """
-    for reach in REACHES:
+    for reach in (1e-5, 1e-4, 1e-3, 5e-3):
         beside = here.z + reach * here.tangent
         for _ in range(2):  # the second time, from a place on the tangent of the other side
             evaluation = newton.evaluate(beside, True)
@@ -32,7 +25,7 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
             if not np.isfinite(rows).all():
                 break
             onward = np.linalg.svd(rows)[2][-1]
-            for length in (times * reach for times in TRIED):
+            for length in (times * reach for times in (0.1, 1.0, 10.0)):
                 for way in (onward, -onward):
                     # Newton's method begins beyond the border: from this side it would find this side again
                     guess = beside + (length - (beside - here.z) @ way) * way
@@ -44,7 +37,8 @@ def beyond_corner(newton: Newton, here: Point) -> Point | None:
                     chord = new.z - here.z
                     distance = math.sqrt(chord @ chord)
                     new.s = here.s + distance
-                    led = led_on(newton, here, new, length) if distance < FAR * length + reach else None
+                    # a point farther beyond the border belongs to another branch
+                    led = led_on(newton, here, new, length) if distance < 5.0 * length + reach else None
                     if led is not None:
                         return led
             beside = here.z + reach * onward

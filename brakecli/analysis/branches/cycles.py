@@ -26,27 +26,10 @@ DIFFERENCE = 3e-6
 """Change of the parameter for derivatives by it. Central ones are exact to 1e-10. A shoe needs that whose dashpots
 are so light that a multiplier stays near 1, as the direction of its branch hangs on it. Straddling a border would
 mix two motions, so that there they are taken to one side."""
-LEANS = 0.9
-"""Cosine between the flow and the normal of its plane below which a new plane is taken."""
-NEAR = 0.03
-"""Part of the period within which no event may lie beside the anchor, as a border would be seen there."""
-GROWN = 2.0
-"""Change of size after which a new chart is taken."""
 SHIFT = 1e-6
 """Length along the branch by which a point is moved to carry its direction to another chart."""
 INSTANT = 1e-12
 """Part of the period that a flow takes at least: it has no step of no length."""
-BEGUN = 1e-9
-"""Part of the period in which the direction of the flow is found at a state: nothing turns within it."""
-LOOKED = 256
-CORRECTED = 8
-"""Places of a cycle at which it is compared with another chart, and corrections of the nearest by Newton's
-method. Choices."""
-PIECES = 64
-"""Parts of a period between whose ends a cycle is a cubic."""
-SHORTEST = 1e-3
-LONGEST = 400.0
-"""Periods of a chart between which a period is sought."""
 
 
 class Flow(Protocol):
@@ -143,7 +126,7 @@ class Cycles(Problem):
     def _flown(self, u: Array, p: float, chart: Chart, derivative: bool = True) -> Flow | str:
         """The flow over the period that is sought, or why there is none."""
         periods = u[4]
-        if not SHORTEST < periods < LONGEST:
+        if not 1e-3 < periods < 400.0:
             return "the period vanishes, or grows without bound"
         try:
             flow = self.flow(p)
@@ -209,7 +192,7 @@ class Cycles(Problem):
             how = flow(state, span, False)
             return (flow.state, np.array(flow.path.velocity)) if how == DONE else None
 
-        return extent([np.array(cycle.state)], cycle.period, cycle.times, PIECES, carry)
+        return extent([np.array(cycle.state)], cycle.period, cycle.times, 64, carry)
 
     def _by_p(self, u: Array, p: float, end: Array, word: tuple[int, ...]) -> Array | None:
         """The derivative of the gap by p, of the same sequence of events: central, or else to one side."""
@@ -253,7 +236,8 @@ class Cycles(Problem):
     def _along(self, u: Array, p: float, scales: Array, time: float) -> Array | None:
         """The direction of the flow at a place, of length one; None where nothing moves there."""
         flow = self.flow(p)
-        flow(self.equilibrium(p) + u[:4] * scales, BEGUN * time, False)
+        # nothing turns within so short a time
+        flow(self.equilibrium(p) + u[:4] * scales, 1e-9 * time, False)
         speed = flow.path.start / scales
         length = math.sqrt(speed @ speed)
         return speed / length if length > 0.0 else None
@@ -263,11 +247,12 @@ class Cycles(Problem):
         cycle = point.facts
         chart = point.chart
         times = cycle.times or (cycle.period,)
-        near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < NEAR * cycle.period
+        # where an event lies beside the anchor, a border would be seen there
+        near = min(times[0], cycle.period - times[-1] if cycle.times else cycle.period) < 0.03 * cycle.period
         grown = cycle.amplitude / chart.size
-        if not near and 1.0 / GROWN < grown < GROWN and self._fits(float(point.u[4])):
+        if not near and 0.5 < grown < 2.0 and self._fits(float(point.u[4])):
             along = self._along(point.u, point.p, chart.scales, cycle.period)
-            if along is not None and chart.normal @ along > LEANS:
+            if along is not None and chart.normal @ along > 0.9:
                 return None
         ahead = _longest_slip(cycle) if near else 0.0
         if ahead is None:
@@ -308,13 +293,13 @@ class Cycles(Problem):
         equilibrium = self.equilibrium(point.p)
         state = np.array(cycle.state)
         best = (math.inf, 0.0)
-        for fraction in np.linspace(0.0, 1.0, LOOKED + 1)[:-1]:
+        for fraction in np.linspace(0.0, 1.0, 257)[:-1]:  # fine enough for Newton's method; a choice
             if flow(state, max(fraction, INSTANT) * cycle.period, False) != DONE:
                 return None
             off = (flow.state - equilibrium) / chart.scales - chart.anchor
             best = min(best, (float(off @ off), float(fraction)))
         ahead = best[1] * cycle.period
-        for _ in range(CORRECTED):  # Newton's method for the time at which the plane is passed
+        for _ in range(8):  # Newton's method for the time at which the plane is passed
             if flow(state, max(ahead % cycle.period, INSTANT * cycle.period), False) != DONE:
                 return None
             off = (flow.state - equilibrium) / chart.scales - chart.anchor

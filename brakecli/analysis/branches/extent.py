@@ -11,9 +11,6 @@ import numpy as np
 
 from brakecli.analysis.branches.problem import Array
 
-BESIDE = 1e-7
-"""Part of the time by which the states on both sides of an event are apart from it."""
-
 Carry = Callable[[float, Array, float], tuple[Array, Array] | None]
 """From a time (s) and a state over a span (s): the state at its end and its derivative; None where that fails."""
 
@@ -40,7 +37,8 @@ def extent(begins: Sequence[Array], period: float, events: Iterable[float], piec
     for number, begin in enumerate(begins):
         first = number * length
         near = middles[(middles > first) & (middles < first + length)] - first
-        beside = [BESIDE * length, *(near - BESIDE * length), *(near + BESIDE * length)]
+        apart = 1e-7 * length
+        beside = [apart, *(near - apart), *(near + apart)]
         times = np.unique(np.clip([*np.linspace(0.0, length, pieces + 1), *beside], 0.0, length))
         states = [begin]
         slopes = list[Array]()

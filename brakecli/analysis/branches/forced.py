@@ -35,21 +35,10 @@ from brakecli.stop import signalled
 DIFFERENCE = 1e-6
 """Change of the parameter for derivatives by it, to one side. The rounding of a flow is about 1e-13, so they are
 exact to about 1e-6, as is the direction of a branch."""
-SNAP = 1e-6
-"""Difference from the wheel's velocity, in the unit of velocities, below which a segment begins with just that.
-A segment that sticks ends with it exactly, but Newton's method gives the next begin with rounding."""
-FIRST_WAVES = 1e-3
-"""Part of the amplitude of the waves with which a motion begins that grows with them."""
 MOST_PERIODS = 4
 """Common periods in which a motion is sought that repeats; a choice, as flips double them."""
-WAITED = 50
-"""Periods for which a run goes on before a motion is sought at its end."""
 AT_REPEAT = 0.1
 """Distance, in depths, of two states of a run from which Newton's method is begun."""
-AS_ONE = 1e-7
-"""Distance of two states of a run below which they are not told apart."""
-SAME = 1e-6
-"""Distance, in depths, of periods of a motion that are one."""
 REASONS = {
     Status.GRAZED: "an event is grazed",
     Status.TOO_MANY_EVENTS: "there are too many events in a segment",
@@ -57,8 +46,6 @@ REASONS = {
     Status.NOT_FINITE: "the motion grows without bound",
     Status.STOPPED: "it was interrupted",
 }
-GROWING = Settings(low=FIRST_WAVES, first=0.05, longest=1.0, change=math.inf, seconds=20.0, insertions=0)
-"""How a motion is followed as the waves grow. Its multipliers do not matter on the way."""
 
 
 class _Flown(NamedTuple):
@@ -128,7 +115,8 @@ class Forced(Doubled):
         runs = list[Flown]()
         word = list[int]()
         for k, state in enumerate(states):
-            if abs(state[2] - belt) <= SNAP * frame.scales[2]:
+            # a segment that sticks ends with just the wheel's velocity, but Newton's method rounds the next begin
+            if abs(state[2] - belt) <= 1e-6 * frame.scales[2]:
                 state[2] = belt
             if signalled():
                 return REASONS[Status.STOPPED]
@@ -269,15 +257,18 @@ class Forced(Doubled):
         if smooth is None:
             return None
         u = np.tile((smooth - here.origin(0.0)) / here.scales, self.segments)
-        first = start(problem, u, FIRST_WAVES)
+        first_waves = 1e-3  # part of the amplitude
+        first = start(problem, u, first_waves)
         if first is None:
             return None
-        branch = follow(problem, first, 1.0, settings or GROWING, stop=signalled)
+        # multipliers do not matter on the way
+        growing = Settings(low=first_waves, first=0.05, longest=1.0, change=math.inf, seconds=20.0, insertions=0)
+        branch = follow(problem, first, 1.0, settings or growing, stop=signalled)
         last = branch.points[-1]
         return start(self, last.u, p) if last.p == 1.0 else None
 
     def settle(
-        self, p: float, state: Array, most: int = MOST_PERIODS, waited: int = WAITED
+        self, p: float, state: Array, most: int = MOST_PERIODS, waited: int = 50
     ) -> "tuple[Forced, Point] | None":
         """The motion that a run from a state (x, y, v_x, v_y) at t = 0 comes to, and the problem of its periods.
 
@@ -297,7 +288,7 @@ class Forced(Doubled):
         gaps = {}
         for count in range(1, most + 1):
             away = visited[begin + count * frame.segments] - visited[begin]
-            gaps[count] = max(math.sqrt(away @ away), AS_ONE)
+            gaps[count] = max(math.sqrt(away @ away), 1e-7)  # closer states are not told apart
         for count in sorted(gaps, key=lambda count: (gaps[count], count)):
             if not gaps[count] < AT_REPEAT:
                 break
@@ -314,7 +305,7 @@ class Forced(Doubled):
             return None
         for fewer in (divisor for divisor in range(1, count) if count % divisor == 0):
             begin = point.u[: len(point.u) // count * fewer]
-            if float(np.abs(np.tile(begin, count // fewer) - point.u).max()) < SAME:
+            if float(np.abs(np.tile(begin, count // fewer) - point.u).max()) < 1e-6:
                 less = self._repeating(begin, p, fewer)
                 if less is not None:
                     return less

@@ -16,10 +16,6 @@ from brakecli.solver.system import System
 
 PLACES = 33
 """Places of the range at which periods, frequencies and steady sliding are looked at."""
-SLOW_PERIODS = 10.0
-"""Periods of the slowest mode in a segment: disturbances stay far above rounding and below the bound of a run."""
-LEAST_STEPS = 100
-"""Steps of a common period, which are cheap: the more, the smoother are kinks of the force at edges of contact."""
 NO_PERIOD = "the waves of the wheel have no common period"
 
 
@@ -58,10 +54,12 @@ def frame_of(line: Line, per_period: float) -> Frame:
         what = f"{NO_PERIOD} of at most {LONGEST:g} s, so no motion that they force repeats"
         remedy = "choose wavelengths with a short common multiple"
         raise CaseError([Wrong(("roughness", "wheel"), what, remedy, source=line.label)])
-    segments = max(math.ceil(period * system.natural_frequencies[0] / SLOW_PERIODS) for system, period in periods)
+    # in ten periods of the slowest mode disturbances stay far above rounding and below the bound of a run
+    segments = max(math.ceil(period * system.natural_frequencies[0] / 10.0) for system, period in periods)
     segments = max(segments, 1)
     steps = max(default_steps(system, period / segments, per_period) for system, period in periods)
-    steps = max(steps, math.ceil(LEAST_STEPS / segments))
+    # steps are cheap: the more, the smoother are kinks of the force at edges of contact
+    steps = max(steps, math.ceil(100 / segments))
     cells = max(default_cells(system) for system, _ in periods)
     middle = periods[len(periods) // 2][0]
     depth = abs(middle.load_at_start) / (middle.coefficients.c_yy + middle.contact_stiffness)

@@ -20,17 +20,10 @@ PARTS = 5
 VALUES = 16
 """Values among which pushes are spread: islands may be as narrow as a thirtieth of the range. More values cost
 more where each has a known cycle, which must be recognized anew."""
-SMALLEST = 0.1
-"""Least size of a push, over that from which on an event follows: a smaller one comes to nothing but linear decay.
-The modes of stable sliding are oblique, so that it may grow by some factor at first."""
 LARGEST = 10.0
 """Largest one, over the compression of the pad: nearly all larger ones land again and come to what these do."""
 LONGEST = 2000.0
 """Periods of the fastest mode for which a push is followed."""
-_TURNED = 1.1673039782614187
-"""The root of x⁵ = x + 1: the multiples of its powers spread evenly in four dimensions (M. Roberts, 2018)."""
-ALIKE = 1e-6
-"""Relative difference of amplitude and period by which two orbits are one."""
 
 
 @dataclass
@@ -91,7 +84,8 @@ def pushes(first: int, count: int, smallest: float) -> Array:
     those of a sphere, the logarithms of the sizes those from the smallest to the largest; both are spread evenly.
     """
     numbers = np.arange(first + 1, first + count + 1)[:, None]
-    size, share, one, other = (numbers * _TURNED ** -np.arange(1.0, 5.0) % 1.0).T
+    # the root of x⁵ = x + 1: the multiples of its powers spread evenly in four dimensions (M. Roberts, 2018)
+    size, share, one, other = (numbers * 1.1673039782614187 ** -np.arange(1.0, 5.0) % 1.0).T
     one = 2.0 * math.pi * one
     other = 2.0 * math.pi * other
     along = np.sqrt(share)
@@ -113,7 +107,9 @@ def try_pushes(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> 
     depth = -shoe.rest[1]
     scales = depth * np.array([1.0, 1.0, fastest, fastest])
     longest = LONGEST * 2.0 * math.pi / fastest
-    smallest = SMALLEST * min(1.0, abs(shoe.belt) / (fastest * depth))
+    # An event follows from 1, or from less, as modes of stable sliding are oblique and a push may grow at first.
+    # What is smaller by far comes to nothing but linear decay.
+    smallest = 0.1 * min(1.0, abs(shoe.belt) / (fastest * depth))
     for push in pushes(first, count, smallest):
         if stop():
             break
@@ -127,4 +123,4 @@ def try_pushes(shoe: Shoe, first: int, count: int, stop: Callable[[], bool]) -> 
 
 def _alike(one: Orbit, other: Orbit) -> bool:
     pairs = (one.amplitude, other.amplitude), (one.period, other.period)
-    return all(math.isclose(*pair, rel_tol=ALIKE) for pair in pairs)
+    return all(math.isclose(*pair, rel_tol=1e-6) for pair in pairs)

@@ -29,9 +29,6 @@ _PLACES = 0.5 + 0.5 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
 _NUMBERS = {node: number for number, node in enumerate(_PLACES.tolist())}
 _WEIGHTS = np.sin(np.pi * (np.arange(NODES) + 0.5) / NODES) * (-1.0) ** np.arange(NODES)
 
-EXACT = 1e-13
-"""Error of the interpolated numbers, relative to their largest, beyond which they are not used."""
-
 
 class Line:
     """The systems of a case whose keys go from `low` (p = 0) to `high` (p = 1)."""
@@ -151,7 +148,7 @@ class Line:
         except CaseError:
             return None
         interpolated = np.array([_interpolated(table, p) for p in between.tolist()])
-        return table if np.all(np.abs(interpolated - exact) <= EXACT * np.abs(table).max(axis=0)) else None
+        return table if np.all(np.abs(interpolated - exact) <= 1e-13 * np.abs(table).max(axis=0)) else None
 
 
 def _row(shoe: Shoe) -> list[float]:

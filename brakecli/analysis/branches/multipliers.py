@@ -11,20 +11,8 @@ from brakecli.solver.arrays import Floats
 
 Complex = NDArray[np.complex128]
 
-ROUNDING = 1e-14
-"""Error of a multiplier relative to the size of the product: some units of rounding in each of its entries."""
-UNKNOWN = 1e-6
-"""Beyond this error of small multipliers beside a huge one, the signs of the tests are checked against it."""
-STABLE = 1e-10
-"""Distance from the unit circle below which a multiplier is not called stable."""
 POWERS = 600.0
 """Largest logarithm by which a scaled product is multiplied, so that it stays a number."""
-SCALED = 1e3
-"""Size beyond which, or below the inverse of which, a product is scaled; a choice, as scaling takes time."""
-SURE = 10.0
-"""Times its error that a factor must have for its sign to count."""
-LARGE = 300.0
-"""Logarithm beyond which asinh is taken from the logarithm, as the number itself may overflow."""
 
 
 class Spectrum(NamedTuple):
@@ -43,7 +31,7 @@ class Spectrum(NamedTuple):
     @property
     def stable(self) -> bool:
         """Whether all multipliers lie inside the unit circle."""
-        return bool(abs(self.multipliers[0]) < 1.0 - STABLE)
+        return bool(abs(self.multipliers[0]) < 1.0 - 1e-10)  # beside the circle rounding decides
 
 
 def product(maps: Floats) -> tuple[Floats, float]:
@@ -54,7 +42,7 @@ def product(maps: Floats) -> tuple[Floats, float]:
         if k:
             total = maps[k] @ total
         size = float(np.abs(total).max())
-        if 1e-300 < size < math.inf and not 1.0 / SCALED < size < SCALED:
+        if 1e-300 < size < math.inf and not 1e-3 < size < 1e3:  # a choice, as scaling takes time
             total = total / size
             log = log + math.log(size)
     return total, log
@@ -70,7 +58,8 @@ def spectrum(maps: Floats) -> Spectrum:
     scaled = sorted(np.linalg.eigvals(total).tolist(), key=abs, reverse=True)
     scale = math.exp(min(log, POWERS))
     values = [complex(value * scale) for value in scaled]
-    error = ROUNDING * max(abs(values[0]), scale * float(np.abs(total).max()))
+    # some units of rounding in each entry of the product
+    error = 1e-14 * max(abs(values[0]), scale * float(np.abs(total).max()))
     pairs = [(a, b) for i, a in enumerate(values) for b in values[i + 1 :]]
     tests = (
         _asinh(((1.0 - a, error) for a in values), error),
@@ -97,8 +86,8 @@ def _asinh(factors: Iterable[tuple[complex, float]], error: float) -> float:
     phase = 1.0 + 0.0j
     for factor, bound in factors:
         size = abs(factor)
-        if error > UNKNOWN and size < SURE * bound:
-            return math.nan
+        if error > 1e-6 and size < 10.0 * bound:
+            return math.nan  # of a small multiplier beside a huge one nobody knows the sign of the factor
         if size == 0.0:
             return 0.0
         log += math.log(size)
@@ -111,5 +100,6 @@ def _scaled_asinh(value: float, log: float) -> float:
     if value == 0.0:
         return 0.0
     total = math.log(abs(value)) + log
-    size = total + math.log(2.0) if total > LARGE else math.asinh(math.exp(total))
+    # beyond 300 the number itself may overflow
+    size = total + math.log(2.0) if total > 300.0 else math.asinh(math.exp(total))
     return math.copysign(size, value)

@@ -11,19 +11,11 @@ from brakecli.analysis.branches.problem import Array, Evaluation, Problem
 
 ROUNDING = 1e-9
 """Gap that may grow from one correction to the next, and part of the range by which p may leave it."""
-GROWS = 4.0
-"""Times by which a gap may grow from one correction to the next; a choice, as the first ones may overshoot."""
-STALLS = 0.3
-"""Size of a correction over the one before, beyond which rounding keeps it from becoming smaller."""
 FROM_AFAR = 15
 """Evaluations for a point that no neighbour on its branch predicts."""
 LEFT = 0.5
 OFF = 1e-7
 """A point has left its branch that lies farther off its guess than this part of a stride, and this length."""
-SHORT = 1e-6
-"""Chord whose direction is mostly rounding."""
-AT_ENDS = 0.02
-"""Part of a bracket that is left at its ends, so that one near a zero is narrowed from both sides."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +134,7 @@ class Newton:
                 word = evaluation.word
                 taken = z
             gap = float(np.abs(evaluation.gap).max())
-            if not gap <= GROWS * last + ROUNDING:
+            if not gap <= 4.0 * last + ROUNDING:  # a choice, as the first corrections may overshoot
                 break
             last = gap
             matrix[:n, :n] = evaluation.by_u
@@ -154,7 +146,7 @@ class Newton:
             if not size <= settings.trust or not length < math.inf:
                 break
             # rounding of the gap may keep corrections from becoming still smaller
-            stalled = size <= settings.near and size > STALLS * before
+            stalled = size <= settings.near and size > 0.3 * before
             before = size
             # where two branches almost meet, a small gap asks for a long step, and the tangent turns as quickly
             lever = max(lever, size / gap if gap > ROUNDING else 0.0)
@@ -246,7 +238,7 @@ class Newton:
         guess = cubic(one, other, fraction)
         onward = one.tangent + other.tangent if one.word == other.word else chord
         # the direction of a very short chord is mostly rounding
-        normal = chord / length if length > SHORT else one.tangent
+        normal = chord / length if length > 1e-6 else one.tangent
         point = self.solve(guess, normal, onward, one.s + fraction * (other.s - one.s), exact=True)
         if point is not None:
             off = point.z - guess
@@ -256,8 +248,11 @@ class Newton:
         return point
 
 
-def zero(low: float, high: float, at_ends: float = AT_ENDS) -> float:
-    """Part of the way from one value to another at which a straight line is zero, but not at the very ends."""
+def zero(low: float, high: float, at_ends: float = 0.02) -> float:
+    """Part of the way from one value to another at which a straight line is zero, but not at the very ends.
+
+    So a bracket whose one end lies near the zero is narrowed from both sides.
+    """
     return min(max(low / (low - high), at_ends), 1.0 - at_ends) if low != high else 0.5
 
 

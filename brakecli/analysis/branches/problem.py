@@ -40,17 +40,14 @@ class Evaluation(NamedTuple):
     """Of the motion, in the unit of the unknowns: of one that is smaller, facts are known to a part of it."""
 
 
-NEARER = 0.03
-"""Part of a step in p with which a derivative is tried again where the step meets another sequence of events; a
-choice."""
-
 Guess = tuple[Array, Array]
 """Unknowns, and a direction (n + 1,) of the unknowns and the parameter, of any length."""
 
 
 def steps_in_p(first: float) -> tuple[float, ...]:
-    """Steps in p by which a derivative is tried, to both sides."""
-    return first, -first, NEARER * first, -NEARER * first
+    """Steps in p by which a derivative is tried, to both sides: shorter ones where others meet another word."""
+    shorter = 0.03 * first  # a choice
+    return first, -first, shorter, -shorter
 
 
 class Problem(Protocol):

@@ -19,15 +19,6 @@ from brakecli.solver.motion.rough import RoughFlow, Status, default_cells, defau
 from brakecli.solver.phases import BACKWARD, OPEN, STICK
 from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
-PLACES = 9
-"""Places of the range at which the cells are counted that are enough."""
-STEPS = 80.0
-"""Steps to the fastest period: a period is short, and the pad lifts off and lands in few of them."""
-SHORTER = 0.6
-LONGER = 1.6
-"""Periods of a chart between which its number of steps fits."""
-INSTANT = 1e-12
-"""Part of the fastest period after which the velocity of the begin is read."""
 _ENDS = {Status.DONE: DONE, Status.GRAZED: GRAZED, Status.TOO_MANY_EVENTS: EVENTFUL}
 
 
@@ -49,7 +40,7 @@ class Span:
         """With so many steps to the fastest period."""
         self._flow = flow
         self._per_period = per_period
-        self._instant = INSTANT / flow.system.natural_frequencies[1]
+        self._instant = 1e-12 / flow.system.natural_frequencies[1]
 
     def __call__(self, state: Array, span: float, tangents: bool = True) -> int:
         """Carry a state over a span (s); see `Flow`."""
@@ -88,13 +79,15 @@ class Span:
 class RoughCycles(Cycles):
     """Limit cycles along a line of cases whose shoe is rough and whose wheel is smooth."""
 
-    def __init__(self, line: Line, periods: int = 1, per_period: float = STEPS) -> None:
-        """`periods`: of the motions from which these have been doubled; steps to the fastest period.
+    def __init__(self, line: Line, periods: int = 1, per_period: float = 80.0) -> None:
+        """`periods`: of the motions from which these have been doubled; `per_period`: steps to the fastest period.
+
+        A period is short, and the pad lifts off and lands in few steps: so they are many.
 
         Raises CaseError where no place is valid, where the wheel is rough, and where speed or load change.
         """
         super().__init__(line, periods)
-        systems = line.systems(PLACES).values()
+        systems = line.systems(9).values()
         if any(system.wheel.g.size for system in systems):
             wrong = "the wheel is rough, so no motion repeats but those that its waves force"
             raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
@@ -114,7 +107,7 @@ class RoughCycles(Cycles):
         return flow.over(state, periods * chart.time, flow.steps(chart.time), derivative)
 
     def _fits(self, periods: float) -> bool:
-        return SHORTER < periods < LONGER
+        return 0.6 < periods < 1.6  # the steps of a chart's period are too many below, and too few above
 
     def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
         if len(word) > 1 or word[0] == STICK:

@@ -22,15 +22,8 @@ SLIDING = "steady sliding"
 LIMIT_CYCLE = "limit cycle"
 FORCED = "forced motion"
 IN_SLIDING = "it ends in steady sliding, where that flutters"
-STRAIGHT = 0.002
-"""Part of the range, of an amplitude or of a frequency by which a straight line between two motions may miss: half
-the width of a line of 1.8 points in a picture 460 points high."""
-ROUNDS = 5
-"""Times for which strides are halved for that, each to a quarter of the distance: from all of an amplitude."""
 SHORTEST = 1e-12
 """Length of a stride, and an amplitude (m), that is rounding."""
-BESIDE = 1e-5
-"""Length along a branch from its begin, within which a special point is that begin."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +166,7 @@ def of_branch(
         if line.smooth:
             first = next((k for k, point in enumerate(points) if len(set(point.facts.word)) > 1), len(points))
         points = points[max(first - 1, 0) :]
-        beyond = points[0].s + BESIDE if line.smooth else 0.0
+        beyond = points[0].s + 1e-5 if line.smooth else 0.0  # what is closer is the begin
         specials = [special for special in specials if special.s > beyond or special.kind == "end"]
         marks.append(_mark(line, Special("flutter", change.p, change.error, points[0], points[0].s), problem))
     for special in specials:
@@ -199,7 +192,7 @@ def finer(line: Line, followed: Followed, stop: Stop) -> Followed:
         return followed
     points = [*branch.points]
     newton = Newton(followed.problem, Settings())
-    for _ in range(ROUNDS):
+    for _ in range(5):  # each time to a quarter of the distance: from all of an amplitude
         for k in reversed(_bent(points)):
             one = points[k]
             other = points[k + 1]
@@ -227,7 +220,8 @@ def _bent(points: list[Point]) -> list[int]:
     cosines = np.sum(chords[1:] * chords[:-1], axis=1) / (lengths[1:] * lengths[:-1])
     turns = np.where(smooth[1:] & smooth[:-1], np.arccos(np.clip(cosines, -1.0, 1.0)), 0.0)
     angles = np.maximum(np.append(turns, 0.0), np.append(0.0, turns))
-    bent = smooth & (lengths * angles > 8.0 * STRAIGHT)
+    # 0.002 is half the width of a line of 1.8 points in a picture 460 points high
+    bent = smooth & (lengths * angles > 8.0 * 0.002)
     return [k for k, far in zip(strides, bent.tolist(), strict=True) if far]
 
 

@@ -15,27 +15,12 @@ from brakecli.solver.tangent import MOST_POWERS
 Over = Callable[[], End | None]
 """Why nothing more may be computed, if so."""
 
-SOUGHT = 1e-9
-"""Change of p below which a zero is located."""
-STILL = 1e-6
-"""Change of s below which a zero is located."""
 MOST_STEPS = 40
 """Steps for one zero or border; some ten are needed."""
-ROUNDING = 1e-11
-"""Least error of a located p."""
 NOTHING = 1e-9
 """A test that is smaller at both ends of a stride vanishes identically, as in area-preserving maps."""
-AT_END = 1e-7
-"""Part of a stride beside its ends in which no zero is sought: Newton's method would find the ends again."""
 ASIDE = 0.1
 """Part of a stride by which a point is moved from where Newton's method fails, or from the ends; a choice."""
-LEFT_OPEN = 0.6
-"""Doubt of a straight line between two points, over their difference: a little more than half of it."""
-TRIES = 4
-SHORTER = 0.25
-"""Strides from one side of a border that are tried, and each over the one before."""
-REAL = 1e-9
-"""Imaginary part of a multiplier, over its size, that is rounding."""
 ONE_PLACE = 1e-4
 """Length over which a turn and a branch point are the same, as on the outer branch of a pitchfork."""
 GRID = np.linspace(0.0, 1.0, 17)
@@ -155,11 +140,11 @@ def _ordered(near: Point, middle: Point, far: Point) -> bool:
 def _beside(newton: Newton, near: Point, far: Point, base: Point) -> Point | None:
     """A point between two of different words, on the side of one of them."""
     stride = 0.5 * (far.s - near.s) * (1.0 if base is near else -1.0)
-    for _ in range(TRIES):
+    for _ in range(4):
         point = newton.solve(base.z + stride * base.tangent, base.tangent, base.tangent, base.s + stride)
         if point is not None and point.word == base.word:
             return point
-        stride *= SHORTER
+        stride *= 0.25
     return None
 
 
@@ -246,7 +231,8 @@ def _near_zeros(s: Array, tests: Array, everywhere: bool) -> list[tuple[int, flo
     elif size == 3:
         error = np.abs(top) * np.abs(weight)[:, :, None]
     else:
-        error = LEFT_OPEN * np.abs(last - first)[:, None, :] * np.ones_like(model)
+        # a straight line between two points is in doubt by a little more than half of their difference
+        error = 0.6 * np.abs(last - first)[:, None, :] * np.ones_like(model)
     side = np.where(first >= 0.0, 1.0, -1.0)[:, None, :]
     floor = side * model - error
     inner = floor[:, 1:-1]
@@ -303,7 +289,7 @@ def _determinant(point: Point, top: float) -> float:
 def _saddle(point: Point) -> bool:
     """Whether the pair with a product near one is real: a neutral saddle, at which no torus is born."""
     pair = resonant_pair(point.multipliers)
-    return pair is None or abs(pair[0].imag) <= REAL * abs(pair[0])
+    return pair is None or abs(pair[0].imag) <= 1e-9 * abs(pair[0])
 
 
 def _locate(newton: Newton, one: Point, other: Point, kind: str, test: Callable[[Point], float]) -> Special:
@@ -314,7 +300,7 @@ def _locate(newton: Newton, one: Point, other: Point, kind: str, test: Callable[
     error = abs(other.p - one.p)
     side = 0
     for _ in range(MOST_STEPS):
-        fraction = zero(low, high, AT_END)
+        fraction = zero(low, high, 1e-7)  # nearer to an end Newton's method would find the end again
         # Newton's method fails very near a branch point: then a little before it, or behind it
         for trial in (fraction, (1.0 - ASIDE) * fraction, ASIDE + (1.0 - ASIDE) * fraction):
             new = newton.between(one, other, trial)
@@ -327,7 +313,7 @@ def _locate(newton: Newton, one: Point, other: Point, kind: str, test: Callable[
         best = new
         value = test(new)
         # at a fold p hardly moves, so the place itself must stand still as well
-        if value == 0.0 or math.isnan(value) or (error < SOUGHT and moved < STILL):
+        if value == 0.0 or math.isnan(value) or (error < 1e-9 and moved < 1e-6):
             break
         if (value >= 0.0) == (low >= 0.0):
             one = new
@@ -339,4 +325,4 @@ def _locate(newton: Newton, one: Point, other: Point, kind: str, test: Callable[
             high = value
             low *= 0.5 if side == -1 else 1.0
             side = -1
-    return Special(kind, best.p, max(error, ROUNDING), best, best.s, "", kind == "fold")
+    return Special(kind, best.p, max(error, 1e-11), best, best.s, "", kind == "fold")

@@ -19,15 +19,6 @@ from brakecli.analysis.stability.modes import Complex, eigensystem
 from brakecli.errors import CaseError
 from brakecli.solver.steady_sliding import PRESSED, sliding, tabulated
 
-PLACES = 65
-"""Places at which steady sliding is looked at."""
-BELOW_GRAZING = 0.9
-"""Part of the amplitude that grazes at which the family of linear vibrations is begun."""
-SMALL = 0.03
-"""Part of its height by which a shoe rises in the first vibration where it touches in part."""
-PHASES = 720
-"""Phases of a linear vibration at which its extremes are looked at."""
-
 
 @dataclass(frozen=True, slots=True)
 class Slide:
@@ -116,7 +107,7 @@ class Sliding:
         """Steady sliding along the whole line, with further places where its margin has extremes."""
         line = self.line
         inner = [line.place(value) for value in middles(line.case_at(0.0), line.keys, line.low, line.high)]
-        values = sorted({*np.linspace(0.0, 1.0, PLACES).tolist(), *inner})
+        values = sorted({*np.linspace(0.0, 1.0, 65).tolist(), *inner})
         return [self.at(p) for p in margin.places(self._margin, values)]
 
     def changes(self, slides: list[Slide]) -> list[Change]:
@@ -139,7 +130,7 @@ class Sliding:
         if self.line.smooth:
             return -y
         full = float(self.line.system(p).pad.constants.full_up_to)
-        return full - y if y < full else SMALL * abs(y)
+        return full - y if y < full else 0.03 * abs(y)
 
     def vibration(self, cycles: Cycles, change: Change) -> Point | None:
         """A motion of the family of linear vibrations that a shoe on a smooth wheel has where it flutters.
@@ -155,14 +146,15 @@ class Sliding:
         which = int(np.argmin(np.abs(slide.eigenvalues - 2j * math.pi * change.frequency)))
         omega = float(slide.eigenvalues[which].imag)
         shape = slide.vectors[:, which]
-        turning = np.exp(2j * math.pi * np.arange(PHASES) / PHASES)
+        phases = 720  # at which its extremes are looked at
+        turning = np.exp(2j * math.pi * np.arange(phases) / phases)
         w = (np.concatenate([shape, 1j * omega * shape])[:, None] * turning).real
         ahead = w[2] * math.copysign(1.0, belt)
         stick = abs(belt) / ahead.max()
         flight = self._rises(change.p, slide.equilibrium[1]) / w[1].max()
-        size = BELOW_GRAZING * min(stick, flight)
+        size = 0.9 * min(stick, flight)
         touch = int(np.argmax(ahead if stick < flight else w[1]))
-        mode = size * w[:, (touch + PHASES // 2) % PHASES]  # far from where it will graze
+        mode = size * w[:, (touch + phases // 2) % phases]  # far from where it will graze
         length = size * float(np.abs(w[:2]).max())
         scales = length * np.array([1.0, 1.0, omega, omega])
         u = np.append(mode / scales, 1.0)

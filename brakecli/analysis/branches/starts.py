@@ -11,25 +11,6 @@ from brakecli.analysis.branches.problem import Array
 from brakecli.analysis.fate import fate_on_smooth_pads
 from brakecli.solver.motion.events import DONE
 
-SETTLE = 400
-SEEN = 8
-"""Periods of the mode for which a motion of a rough shoe is left to itself, and in which returns are sought."""
-LOOKS = 60
-SOONEST = 12
-"""Places of a period at which the motion is looked at, and after how many it may have returned."""
-PARTS = 4
-"""Parts of a period that a motion left to itself is carried at a time, and places whose return is sought."""
-RETURNS = 0.25
-"""Distance, in sizes of the motion, of a state from an earlier one that may be the same."""
-TRIES = 12
-"""Pairs of states from which Newton's method is begun."""
-CLEAR = 0.05
-"""Part of the wheel's speed by which a first state has to slide: one that sticks is no place of a section."""
-WHOLE = 0.3
-"""Part of the size that was seen which a cycle has at least: a smaller one is another."""
-AT_REST = 1e-3
-"""Size of a motion, over the compression of the pad, below which it has died out."""
-
 
 def settle(problem: Cycles, p: float, state: Array, frequency: float) -> Point | None:
     """The cycle that the motion from a state (x, y, v_x, v_y) comes to at p.
@@ -70,30 +51,37 @@ def _returning(problem: Cycles, p: float, state: Array, frequency: float) -> Poi
     flow = problem.flow(p)
     equilibrium = problem.equilibrium(p)
     period = 1.0 / frequency
-    states = [np.array(state, float)]
-    for k in range(SETTLE * PARTS + SEEN * LOOKS):
-        if flow(states[-1], period * (1.0 / PARTS if k < SETTLE * PARTS else 1.0 / LOOKS), False) != DONE:
+    state = np.array(state, float)
+    for _ in range(4 * 400):  # periods for which it is left to itself, by quarters
+        if flow(state, 0.25 * period, False) != DONE:
             return None
-        states = [flow.state] if k < SETTLE * PARTS else [*states, flow.state]
+        state = flow.state
+    states = [state]
+    per_period = 60
+    for _ in range(8 * per_period):  # periods in which returns are sought
+        if flow(states[-1], period * (1.0 / per_period), False) != DONE:
+            return None
+        states.append(flow.state)
     samples = np.array(states)
     size = 0.5 * float(np.ptp(samples[:, :2], axis=0).max())
-    if not size > AT_REST * abs(equilibrium[1]):
-        return None
+    if not size > 1e-3 * abs(equilibrium[1]):
+        return None  # it has died out
     omega = 2.0 * math.pi * frequency
     scales = size * np.array([1.0, 1.0, omega, omega])
     x = 0.5 * float(np.ptp(samples[:, 0]))
     belt = problem.line.shoe(p).belt
-    places = [k for k in range(LOOKS) if abs(samples[k, 2] - belt) > CLEAR * abs(belt)]
+    # a state that sticks is no place of a section
+    places = [k for k in range(per_period) if abs(samples[k, 2] - belt) > 0.05 * abs(belt)]
     tries = 0
-    for k in places[:: max(len(places) // PARTS, 1)]:
+    for k in places[:: max(len(places) // 4, 1)]:
         away = np.abs((samples - samples[k]) / scales).max(axis=1)
-        for j in range(k + SOONEST, len(samples) - 1):
-            if not (away[j] < RETURNS and away[j - 1] >= away[j] <= away[j + 1]):
+        for j in range(k + per_period // 5, len(samples) - 1):
+            if not (away[j] < 0.25 and away[j - 1] >= away[j] <= away[j + 1]):  # sizes of the motion
                 continue
             tries += 1
-            if tries > TRIES:
+            if tries > 12:
                 return None
-            point = _started(problem, p, samples[k], (j - k) / LOOKS * period, scales, period, x)
-            if point is not None and point.facts.amplitude > WHOLE * x:
+            point = _started(problem, p, samples[k], (j - k) / per_period * period, scales, period, x)
+            if point is not None and point.facts.amplitude > 0.3 * x:  # a smaller cycle is another one
                 return point
     return None

@@ -13,14 +13,6 @@ from brakecli.case.case import Case
 from brakecli.solver.system import System
 
 FRICTION = "friction.coefficient"
-UP_TO = 2.0
-"""Upper end of the range, in critical friction. A branch may first lead up from flutter, turn there, and come down
-below it: the range reaches as far above the critical friction as there is room below. Branches are known to get
-through to there (`make bench-branch`)."""
-BEYOND = 1.05
-"""Upper end of the range, in friction of the case, where that lies higher and sliding is stable there again."""
-REACHES = 1e-6
-"""Distance from an edge, over the range, at which a window ends at that edge."""
 POINTS = 500
 """Motions of a branch. Nine branches of ten need fewer; a thousand may take most of a minute if cycles are long.
 It is a count and not a time, so that the same case gives the same answer."""
@@ -73,9 +65,11 @@ def thresholds(
     if not system.steady:
         return _without_branches(limits, "speed or load change, so that no vibration is followed below that")
     own = report.friction
-    highest = UP_TO * lost.friction
+    # A branch may first lead up from flutter, turn there, and come down below it: the range reaches as far above
+    # the critical friction as there is room below. Branches get through to there (`make bench-branch`).
+    highest = 2.0 * lost.friction
     if report.stable:
-        highest = max(highest, BEYOND * own)
+        highest = max(highest, 1.05 * own)  # where sliding is stable again
     explorer = Explorer(Line(case, [FRICTION], 0.0, highest), tell, lambda: False, points=POINTS)
     explored = explorer.explore(pushes=pushes)
     answers = Answers(explored, own if own <= highest else None)
@@ -109,7 +103,7 @@ def _beside(answers: Answers, critical: float) -> str:
         return "the vibration that begins there does not exist below it"
     low, high = (line.value(p) for p in (coexisting[0][0], max(end for _, end, _ in coexisting)))
     edges = [line.high, critical, *answers.critical_windows_lower]
-    reaches = any(abs(high - edge) <= REACHES * line.high for edge in edges)
+    reaches = any(abs(high - edge) <= 1e-6 * line.high for edge in edges)
     until = "on" if reaches else f"to {high:.4g}{' at least' if cut else ''}"
     words = f"a vibration{answers.pushed} can exist from {low:.4g} {until}"
     if answers.barrier is not None:

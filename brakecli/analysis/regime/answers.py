@@ -7,13 +7,9 @@ from typing import Any, NamedTuple
 
 from brakecli.analysis.regime.decision import Thresholds, fill
 
-_ROUNDING = math.log(1e9)  # powers of e from rounding to the size of a motion
 QUARTER = 4.0 / 3.0  # a run whose last quarter is settled, over what comes before
 FADED = 3.0  # powers of e after which a change has ended: 5 % of it are left
-_TWICE = 2.0  # times as long, at least, that a run is asked to be; a choice
-_MOST_TIMES = 16.0  # and at most; a choice
 LONGER = 1.4  # a run whose last quarter and the window before it are settled, over what comes before
-
 
 RENAMED = {
     "stands": "wheel_stands",
@@ -165,8 +161,8 @@ class Answers(NamedTuple):
     def told_apart(self) -> float:
         """Duration after which an exponent is told from 0, as its error falls with the square root of the time."""
         errors = Thresholds.sure_errors * self.lyapunov_error / max(abs(self.lyapunov_exponent), 1e-300)
-        times = min(errors, math.sqrt(_MOST_TIMES)) ** 2
-        return QUARTER * self.duration * max(times, _TWICE)
+        times = min(errors, 4.0) ** 2
+        return QUARTER * self.duration * max(times, 2.0)  # 2 to 16 times as long; choices
 
     @property
     def becomes(self) -> str:
@@ -238,7 +234,7 @@ class Answers(NamedTuple):
     @property
     def or_longer(self) -> str:
         """How long it takes to grow from rounding to the size of a motion, if that is longer than the run."""
-        seconds = _ROUNDING / self.growth_rate
+        seconds = math.log(1e9) / self.growth_rate
         return f", or run at least {seconds:.2g} s" if seconds > self.duration else ""
 
     @property

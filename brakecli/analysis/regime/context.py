@@ -19,9 +19,6 @@ from brakecli.solver.schedules import value_at, values
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 
-_STRONG = 0.01  # of the largest swing that a wave forces: smaller ones do not make the pattern
-_ROUNDING = 1e-9  # of the speed at which the compressed pad can swing: smaller speeds may come from rounding
-
 
 class Context(NamedTuple):
     """What is known of the case behind a history."""
@@ -48,7 +45,7 @@ class Context(NamedTuple):
     @property
     def pattern(self) -> float:
         """Time (s) until the strong waves repeat: a turn or a part of it if they are orders, or the longest."""
-        strong = _STRONG * max((swing for _, swing in self.waves), default=0.0)
+        strong = 0.01 * max((swing for _, swing in self.waves), default=0.0)
         passing = [frequency for frequency, swing in self.waves if swing > strong]
         turns = abs(self.belt_speed) / (2.0 * math.pi * self.radius)
         orders = [round(f / turns) for f in passing]
@@ -77,7 +74,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
     highest = 0.5 / system.interval
     swings = np.abs(linear.waves[:, 0]) if turns and (linear := theory()) else np.ones(len(turns))
     waves = tuple((abs(belt) * turn, float(swing)) for turn, swing in zip(turns, swings, strict=True))
-    fastest = compression * system.natural_frequencies[1]
+    fastest = compression * system.natural_frequencies[1]  # at which the compressed pad can swing
     return Context(
         belt,
         radius=system.radius,
@@ -85,7 +82,7 @@ def context(system: System, theory: Theory | None = None) -> Context:
         steady=system.steady,
         forced=forced_lines(belt, turns, highest),
         waves=waves if belt else (),
-        quiet=_ROUNDING * fastest,
+        quiet=1e-9 * fastest,
         frictionless=c.phi == 0.0,
         undamped=is_undamped(c),
         held_by_link=c.c_xx > 0.0,

@@ -11,28 +11,16 @@ from brakecli.analysis.regime.spectra import rises
 from brakecli.analysis.spectrum import Array
 from brakecli.solver.track import LIFT, MIN, SLIP, STICK, TOUCH, Events
 
-_HARMONICS = 5
-_MOST_RISES_PER_CYCLE = 4
-_FEWEST = 3  # cycles in which a drift can be told from their spread
-_MIDDLE = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])  # quantiles
-# Of the standard deviation of vx, in the mean of a rise. A slower rise is ripple.
-_BANDS: tuple[float, ...] = 0.2, 0.35, 0.6, 0.1
-_SAME = 0.035  # squared difference, over twice the variance, between one period of the mean of vx and the next:
-# where vx jumps, interpolation between eight samples of a cycle makes 0.031 of it
-_AS_SAME = 4.0  # times the least of these, up to which a shorter period is the period
-_SEEN = 0.85  # least part of a force's swing in every other sample that all samples see
-_EARLY = 1 / 8  # of a cycle: where it begins with a stick, a step may place that before its begin
 DRIFT = 5e-3
 """Part by which amplitude or frequency of a settled limit cycle may be off, or change."""
-# of an amplitude and a period, per step in a contact: most that impacts were off
-SIZE_OFF = 3.5
-_PERIOD_OFF = 0.2
+SIZE_OFF = 3.5  # of an amplitude, per step in a contact: most that impacts were off
 
 
 def median(values: Array) -> tuple[float, float]:
     """Median, and half of the range of the middle two thirds."""
     last = len(values) - 1
-    low, middle, high = np.interp(last * _MIDDLE, np.arange(last + 1), np.sort(values)).tolist()
+    quantiles = np.array([1.0 / 6.0, 0.5, 5.0 / 6.0])
+    low, middle, high = np.interp(last * quantiles, np.arange(last + 1), np.sort(values)).tolist()
     return middle, 0.5 * (high - low)
 
 
@@ -72,14 +60,15 @@ def cycles_of(stretch: Stretch, events: Events, step: float = 0.0, known: float 
     ten groups of cycles.
     """
     begins, lag = _beginnings(stretch, events, known)
-    if len(begins) <= _FEWEST:
+    if len(begins) <= 3:  # fewer do not tell a drift from their spread
         return None
     cycles = len(begins) - 1
     interval = stretch.history.interval
     edges = np.linspace(0, cycles, min(cycles, GROUPS) + 1).astype(int)
     groups = begins[edges]
     period, period_spread = median(np.diff(groups) / np.diff(edges))
-    sticks = np.histogram(events.time[events.kind == STICK], begins - _EARLY * period)[0]
+    # a step may place a stick with which a cycle begins before that
+    sticks = np.histogram(events.time[events.kind == STICK], begins - 0.125 * period)[0]
 
     def time_in(begin: int, end: int) -> tuple[float, float]:
         """Part of a cycle between two kinds of events, and its spread, with the step."""
@@ -105,11 +94,11 @@ def cycles_of(stretch: Stretch, events: Events, step: float = 0.0, known: float 
     amplitude, spread = median(sizes)
     contact = contact_time(events, groups[0], groups[-1])
     turn = 2.0 * np.pi * step / period
-    impact = step / contact
+    impact = step / contact  # of which periods were off by a fifth at most, and sizes by `SIZE_OFF`
     return Cycles(
         evidence,
         frequency,
-        frequency_off=frequency * (turn**2 / 8.0 + _PERIOD_OFF * impact),
+        frequency_off=frequency * (turn**2 / 8.0 + 0.2 * impact),
         amplitude=amplitude,
         amplitude_spread=spread + (0.25 * turn**2 + SIZE_OFF * impact) * amplitude,
         stick_fraction=stick,
@@ -142,7 +131,7 @@ def contact_time(events: Events, begin: float, end: float) -> float:
 
 def in_lines(stretch: Stretch, frequency: float) -> dict[str, Any]:
     """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
-    first, *higher = (stretch.share([n * frequency]) for n in range(1, _HARMONICS + 1))
+    first, *higher = (stretch.share([n * frequency]) for n in range(1, 6))
     multiples = range(1, 1 + int(0.5 / (frequency * stretch.history.interval)))
     return {
         "fundamental_share": first,
@@ -165,7 +154,7 @@ def _force_variation(stretch: Stretch, begins: Array, groups: Array) -> float | 
     odd = np.floor(position / unseen) % 2.0 == 1.0
     samples = [force, np.where(odd, force, np.nan), np.where(odd, np.nan, force)]
     varies = [median(np.fmax.reduceat(values, first) - np.fmin.reduceat(values, first))[0] for values in samples]
-    return varies[0] if min(varies) >= _SEEN * varies[0] else None
+    return varies[0] if min(varies) >= 0.85 * varies[0] else None  # what all samples see
 
 
 def _unseen(places: Array) -> tuple[float, float]:
@@ -179,8 +168,9 @@ def _unseen(places: Array) -> tuple[float, float]:
 def _beginnings(stretch: Stretch, events: Events, known: float) -> tuple[Array, int]:
     """When cycles begin (s), and how many rises of x each holds: after so many the motion repeats.
 
-    Rises are told from ripple by the first of `_BANDS` of the level of vx with which it does. Where its period (s)
-    is `known`, that says after how many: samples take rises for the same that differ by less than they show.
+    A rise in which the mean of vx stays within a band about 0 is ripple: of four bands the first is taken with
+    which the motion repeats. Where its period (s) is `known`, that says after how many rises: samples take rises
+    for the same that differ by less than they show.
     """
     turning = events.kind <= MIN
     level = stretch.deviation("vx")
@@ -188,7 +178,7 @@ def _beginnings(stretch: Stretch, events: Events, known: float) -> tuple[Array, 
     time = events.time[turning]
     mean = np.diff(stretch.last("x"))
     speed = np.diff(events.x[turning]) / np.maximum(np.diff(time), 1e-300)
-    everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in _BANDS]
+    everywhere = [time[1 + rises(speed, -band * level, band * level)] for band in (0.2, 0.35, 0.6, 0.1)]
     candidates = {len(times): times for times in everywhere if len(times) > 1}.values()
     for begins in candidates:
         lag = _fitting(known * (len(begins) - 1) / (begins[-1] - begins[0]))
@@ -196,10 +186,11 @@ def _beginnings(stretch: Stretch, events: Events, known: float) -> tuple[Array, 
             return begins[::lag], lag
     for begins in candidates:
         rise = max((begins[-1] - begins[0]) / (len(begins) - 1) / interval, 1.0)
-        lags = np.arange(1, _MOST_RISES_PER_CYCLE + 1)
+        lags = np.arange(1, 5)
         unlike = np.array([_unlike(mean, lag * rise) for lag in lags if lag * rise < len(mean) // 2])
-        if len(unlike) and unlike.min() <= _SAME:
-            lag = 1 + int(np.argmax(unlike <= max(_SAME, _AS_SAME * unlike.min())))
+        same = 0.035  # where vx jumps, interpolation between eight samples of a cycle makes 0.031
+        if len(unlike) and unlike.min() <= same:
+            lag = 1 + int(np.argmax(unlike <= max(same, 4.0 * unlike.min())))
             return begins[::lag], lag
     return everywhere[0], 1
 

@@ -19,13 +19,8 @@ WINDOWS = 40
 LAST = 10  # windows of the last quarter, which gives the final values
 LONGEST = 1 << 20  # samples read at a time; cycles and lines are sought in at most so many, the last ones
 LINE_BINS = 4  # on either side of a line: the Hann window's main lobe, and the line's drift within the record
-_MOST_LINES = 8
-_LEAST_LINE = 1e-3  # part of the energy
-_MOST_PLACES = 1 << 16  # samples at which a forced motion is computed
 GROUPS = 10  # of neighbouring values, whose means or medians are taken
 FULL = 1.0 - 1e-9  # part of the pad that touches in full contact, but for rounding
-_MOST_COVERED = 0.2  # part of the band on lines, beyond which they are not told from what lies beside them
-_LEAST_FORCED = 0.02  # of what lies beside the lines: that much of a decaying motion leaks onto them
 
 
 def tenths(samples: int) -> tuple[int, int]:
@@ -109,7 +104,7 @@ class Stretch:
 
     def places(self, name: str = "x") -> tuple[Array, Array]:
         """Evenly spaced samples of a variable, not too many, and their times (s)."""
-        stride = -(-(self.stop - self.start) // _MOST_PLACES)
+        stride = -(-(self.stop - self.start) // (1 << 16))
         picked = []
         first = self.start
         for begin in range(self.start, self.stop, LONGEST):
@@ -151,7 +146,7 @@ class Stretch:
 
         None where the lines lie too close for the length of the record, or hold no more than leaks onto them.
         """
-        if self.covered(lines) > _MOST_COVERED or self.stop - self.start < FEWEST_SAMPLES // 4:
+        if self.covered(lines) > 0.2 or self.stop - self.start < FEWEST_SAMPLES // 4:
             return None
         x = self.last("x")
         window = np.hanning(len(x))
@@ -162,7 +157,7 @@ class Stretch:
         forced = np.fft.irfft(np.where(chosen, spectrum, 0.0), len(x))[middle] / window[middle]
         forced -= 0.5 * (forced.max() + forced.min())
         parts = 0.5 * float(np.ptp(forced)), 0.5 * float(np.ptp(x[middle] - forced))
-        return parts if parts[0] > _LEAST_FORCED * parts[1] else None
+        return parts if parts[0] > 0.02 * parts[1] else None  # so much of a decaying motion leaks onto the lines
 
     def beside(self, name: str, lines: Sequence[float]) -> tuple[float, float]:
         """Part of the deviation of a variable that lies on no line (Hz), and half of its peak to peak."""
@@ -184,11 +179,11 @@ class Stretch:
         strongest = list[tuple[float, float, float]]()
         chosen = _near(forced, frequencies)
         total = total if self.amplitude("vx") > quiet else 0.0
-        while total > 0.0 and len(strongest) < _MOST_LINES:
+        while total > 0.0 and len(strongest) < 8:
             top = int(np.argmax(remaining))
             near = slice(max(top - LINE_BINS, 0), top + LINE_BINS + 1)
             share = float(remaining[near].sum()) / total
-            if share < _LEAST_LINE:
+            if share < 1e-3:
                 break
             remaining[near] = 0.0
             if top < FEWEST_CYCLES:

@@ -19,8 +19,6 @@ from brakecli.solver.motion.flow import Orbit
 
 RELAXED = 1.0  # power of e by which a disturbance fades within a settled part, which then shows what lasts
 _REST = 0.3  # of a forced motion, by which its closed form may be off
-_STAYS = 0.25  # part of the expected decay; what decays by less of it in the second half does not decay
-_ABOVE = 1.2  # times what is left in the last quarter: windows below that hold no more than is left
 ROOM = 1.05  # a requested run is longer than needed by this, so that it holds whole samples and windows
 
 
@@ -105,8 +103,10 @@ def _gone(shown: Sequence[Shown], decays: Sequence[float], own: Array, forced: A
     end = 0.5 * (high[:, -LAST:].max(axis=1) - low[:, -LAST:].min(axis=1))  # a window may be shorter than a period
     change, _ = trend(np.log(np.maximum(swing[:, WINDOWS // 2 :], 1e-300)))
     lost = 0.5 * np.array(decays) * shown[0].duration
-    stays = (0.5 * lost > RELAXED) & (change > -_STAYS * lost)
-    level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, _ABOVE * end), within * forced)
+    # what decays by less than a quarter of what is expected stays; windows hold no more than the last quarter
+    # where they are below 1.2 times that
+    stays = (0.5 * lost > RELAXED) & (change > -0.25 * lost)
+    level = np.where((end < _REST * forced) & stays, np.maximum(within * forced, 1.2 * end), within * forced)
     late = (swing > level[:, None])[:, ::-1]
     window = np.where(late.any(axis=1), WINDOWS - late.argmax(axis=1), 1)
     columns = {"window": window, "level": level, "end": end, "stays": stays}

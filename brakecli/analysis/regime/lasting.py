@@ -18,17 +18,6 @@ from brakecli.solver.alike import at_once
 from brakecli.solver.history import History, stacked
 from brakecli.solver.motion.flow import Orbit
 
-_LIKELY = 16  # waves, of which one moves x most
-# of a settled part, in which the friction force is compared
-_FEWEST_PIECES = 4
-_PIECES = 16
-_WIDER = 1.02  # times as far as in the last half of them, a transient swings
-_SPARSE = 8  # of the places at which a forced motion is computed, one of so many suffices
-_MODULATES = 0.1  # of a vibration, beside which waves count: smaller ones change its cycles, too
-_CYCLES_SHARE = 0.5  # of the energy on the lines of the cycles, below which the strongest line is the frequency
-_AIM = 0.3  # part of what a settled cycle may be off, to which the requested step brings it; a choice
-_WHOLE = 0.999  # part of the pattern of waves that counts as all of it: samples may miss the rest
-_FINER = 0.25  # requested sample interval over the one that misses impacts; a choice
 _VAGUE = "the amplitude may be off by as much as itself: run longer, or take a smaller solver.step"
 
 
@@ -89,7 +78,7 @@ def _lasting(
 
 def _wave(shown: Shown, stretch: Stretch) -> float | None:
     """The passing frequency (Hz) of the wave that moves x most; where many pass, of those that should do so."""
-    likely = sorted(shown.context.waves, key=lambda wave: -wave[1])[:_LIKELY]
+    likely = sorted(shown.context.waves, key=lambda wave: -wave[1])[:16]
     if not likely:
         return None
     x, time = stretch.places()
@@ -145,29 +134,30 @@ def _beating(shown: Shown, stretch: Stretch) -> float:
     if not (theory := shown.context.linear()):
         return 1.0
     x, time = stretch.places()
-    (forced,), (lasting,), _ = parts([theory], x[None, ::_SPARSE], time[::_SPARSE])
+    (forced,), (lasting,), _ = parts([theory], x[None, ::8], time[::8])
     return 2.0 * float(forced) / max(float(np.ptp(lasting)), 1e-300)
 
 
 def _settle_force(shown: Shown, numbers: Lasting, stop: int) -> None:
     """Find from where on the friction force has settled: it may ring longer than x.
 
-    From there on it swings no wider, within pieces of the settled part, than in the last half of them.
+    From there on it swings no wider, within 4 to 16 pieces of the settled part, than in the last half of them.
     """
     stretch = numbers.stretch
     interval = shown.history.interval
     seconds = max(shown.context.pattern, shown.beat())
-    count = min(int((stretch.stop - stretch.start) * interval / seconds), _PIECES) if seconds else 0
-    if count < _FEWEST_PIECES:
+    count = min(int((stretch.stop - stretch.start) * interval / seconds), 16) if seconds else 0
+    if count < 4:
         return
     ends = np.linspace(stretch.start, stop, count + 1).astype(int).tolist()
     pieces = (replace(stretch, start=start, stop=stop) for start, stop in pairwise(ends))
     widths = np.array([piece.amplitude("friction_force") for piece in pieces])
     late = widths[count // 2 :]
-    first = int(np.flatnonzero(np.append(True, widths > _WIDER * late.max()))[-1])
+    wider = 1.02
+    first = int(np.flatnonzero(np.append(True, widths > wider * late.max()))[-1])
     if (np.diff(widths[: first + 1]) < 0.0).all():  # not the chance of waves that meet
         numbers.force_from = ends[first]
-    if len(late) >= _FEWEST_PIECES and (np.diff(late) < 0.0).all() and late[0] > _WIDER * late[-1]:
+    if len(late) >= 4 and (np.diff(late) < 0.0).all() and late[0] > wider * late[-1]:
         numbers.force_rings = shown.duration
 
 
@@ -200,12 +190,13 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     elif not answers.waves and far and not turns_for_good:
         text = f"continued, this vibration comes to {answers.limit}: {longer}"
         if shown.context.step and apart < math.inf:
-            finer = shown.context.step * _AIM / apart  # large shifts grow less than with its square
+            # to a third of what may be off; a choice, as large shifts grow less than with the square of the step
+            finer = shown.context.step * 0.3 / apart
             text += f"; if it stays as it is, its steps shift it: take a solver.step of {finer:.2g} s, or a"
             text += " solver.tolerance"
     elif changed > DRIFT:
         text = f"its amplitude or frequency still changes by {changed:.1%} within the settled part: {longer}"
-    elif answers.waves and seconds < (beat := shown.beat(_MODULATES * cycles.amplitude)):
+    elif answers.waves and seconds < (beat := shown.beat(0.1 * cycles.amplitude)):  # smaller waves change it, too
         text = f"the waves beat every {beat:.3g} s: run at least {ROOM * (stretch.start * interval + beat):.3g} s"
         text += " for numbers that last"
     numbers.settled = lasts and text is None
@@ -223,7 +214,7 @@ def _self_excited(shown: Shown, answers: Answers, cycles: Cycles) -> Lasting:
     spread = with_drift(wander, cycles.frequency, cycles.detuning)
     wander = (wander if spread is None else spread) + cycles.frequency_off
     numbers.frequency = cycles.frequency
-    if cycles.evidence["harmonic_share"] < _CYCLES_SHARE and answers.stick_cycles < shown.limits.stick_cycles:
+    if cycles.evidence["harmonic_share"] < 0.5 and answers.stick_cycles < shown.limits.stick_cycles:
         numbers.frequency, wander = stretch.strongest
         numbers.evidence |= in_lines(stretch, numbers.frequency)
     short = seconds < shown.slowest(0.0) or abs(answers.level_change) > shown.limits.settled_within
@@ -294,7 +285,7 @@ def _add_force(shown: Shown, numbers: Lasting, mean: float, variation: float, *,
     if numbers.cycles:
         numbers.variation = numbers.cycles.force_variation
         if numbers.variation is None:
-            finer = f"give an output.sample_interval of {_FINER * interval:.2g} s"
+            finer = f"give an output.sample_interval of {0.25 * interval:.2g} s"  # a choice
             text = f"samples miss impacts of the friction force, and torque_variation is missing: {finer}"
             numbers.notes["torque_variation"] = text
     elif numbers.force_rings is not None:
@@ -302,7 +293,7 @@ def _add_force(shown: Shown, numbers: Lasting, mean: float, variation: float, *,
         longer = QUARTER * (shown.duration + numbers.force_rings)
         text = f"the friction force still rings, and torque_variation is missing: run at least {longer:.3g} s"
         numbers.notes["torque_variation"] = text
-    elif lasts and shown.context.steady and seconds < _WHOLE * pattern:
+    elif lasts and shown.context.steady and seconds < 0.999 * pattern:  # samples may miss the rest
         numbers.notes["torque_variation"] = (
             f"torque_variation needs {pattern:.3g} s, until the waves repeat: run longer"
         )

@@ -24,8 +24,6 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Events, Track
 
-_NOTHING = 1e-3  # of a beat over the slowest wave, that is rounding
-
 
 class Given(NamedTuple):
     """A motion that is to be judged, with what is known of it."""
@@ -170,7 +168,7 @@ def _beat(counts: tuple[float, ...]) -> float:
     """Period (s) of the slowest of some waves (Hz), or of the slowest beat of one with a multiple of another."""
     slow = 1.0 / min(counts) if counts else 0.0
     beats = [abs(f - n * g) for f in counts for g in counts for n in range(1, MULTIPLES + 1)]
-    return max([slow, *(1.0 / beat for beat in beats if beat * slow > _NOTHING)])
+    return max([slow, *(1.0 / beat for beat in beats if beat * slow > 1e-3)])  # less is rounding
 
 
 def answers(shown: Shown) -> Answers:

@@ -18,13 +18,7 @@ from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.steady_sliding import forces_along
 from brakecli.solver.system import System
 
-_FINER = 4
-# a window of fewer holds next to nothing
-_FEWEST = 5
-_MOST_SAMPLES = 1024
-_MOST_WORK = 1 << 24  # values of waves at nodes
 _LEAST = 0.05  # part of a number from which on it is said
-_STIFFNESSES = np.geomspace(0.8, 1.25, 33)  # of a pad that opens, over the mean one of steady sliding
 
 
 class Ripple(NamedTuple):
@@ -57,12 +51,14 @@ def ripple(
     Where the part is forced on `lines` (Hz), what lies beside them is ripple: the mean stiffness of an open pad
     may miss a resonance.
     """
-    samples = min(stretch.stop - stretch.start, _MOST_SAMPLES)
+    samples = min(stretch.stop - stretch.start, 1024)
     end = Stretch(stretch.history, stretch.stop - samples, stretch.stop)
-    work = samples * _FINER * system.nodes * len(system.wheel.g)
-    if samples < _FEWEST or not 0 < work <= _MOST_WORK or system.method.step is None or end.touches():
+    nodes = 4 * system.nodes
+    work = samples * nodes * len(system.wheel.g)
+    # a window of fewer samples holds next to nothing
+    if samples < 5 or not 0 < work <= 1 << 24 or system.method.step is None or end.touches():
         return None
-    pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, _FINER * system.nodes)
+    pad = build_pad(system.layer_stiffness, system.half_length, system.shoe, system.wheel, nodes)
     layer = build_layer(system.evaluator, pad, moving=True)
     names = ("x", "y", "vx", "normal_force")
     x, y, v_x, force = (stretch.history.read(name, end.start, end.stop) for name in names)
@@ -116,7 +112,8 @@ def detuned(
     size = np.abs(np.fft.rfft(x * np.hanning(len(x)))[1:]) ** 2
     frequencies = np.fft.rfftfreq(len(x), stretch.history.interval)[1:]
     energy = np.bincount(np.searchsorted(0.5 * (ordered[1:] + ordered[:-1]), frequencies), size, len(ordered))
-    stiffnesses = np.minimum(_STIFFNESSES * stiffness(), system.contact_stiffness)
+    # of a pad that opens, beside the mean one of steady sliding
+    stiffnesses = np.minimum(np.geomspace(0.8, 1.25, 33) * stiffness(), system.contact_stiffness)
     grip = c.grip(belt)
     omega = 2.0 * math.pi * ordered[:, None, None]
     values = np.linalg.eigvals([first_order(c, stiffness_matrix(c, k, grip) / c.m) for k in stiffnesses])

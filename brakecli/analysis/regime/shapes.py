@@ -6,13 +6,12 @@ from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.conditions import comes_to_it, regular, steady
 from brakecli.analysis.regime.decision import Excitation, Regime, Row, Thresholds
 
-_UNSETTLED = 1.5  # times the fewest cycles, where not all of them are settled; a choice
-
 SHAPES: tuple[Row[Answers, Thresholds], ...] = (
     Row(
         "few cycles",
         lambda motion, limits: (
-            not motion.cycles or motion.cycles < (1.0 if motion.settled else _UNSETTLED) * limits.fewest_cycles
+            # 1.5: where not all of them are settled; a choice
+            not motion.cycles or motion.cycles < (1.0 if motion.settled else 1.5) * limits.fewest_cycles
         ),
         "but only {cycles:.0f} cycles[ in {settled_duration:.3g} s]",
         "run longer",

@@ -8,10 +8,6 @@ from numpy.typing import NDArray
 from brakecli.analysis.spectrum import Array
 
 MULTIPLES = 10  # of a passing frequency that are its lines
-# strongest bands, each from its peak over this to its peak times this
-_BANDS = 3
-_WIDE = 1.06
-_MOST_PAIRED = 2000  # waves; sums of two are lines where there are no more
 
 
 def rises(values: Array, low: float, high: float) -> NDArray[np.intp]:
@@ -26,9 +22,9 @@ def line_share(power: Array) -> float:
     remaining = power.copy()
     total = float(power.sum())
     energy = 0.0
-    for _ in range(_BANDS):
+    for _ in range(3):
         peak = int(np.argmax(remaining))
-        band = slice(int(peak / _WIDE), int(peak * _WIDE) + 2)
+        band = slice(int(peak / 1.06), int(peak * 1.06) + 2)
         energy += float(remaining[band].sum())
         remaining[band] = 0.0
     return energy / total if total > 0.0 else 0.0
@@ -41,7 +37,7 @@ def forced_lines(belt_speed: float, waves_per_metre: tuple[float, ...], highest:
     With more than 2000 waves the sums and differences are left out: they would fill the spectrum, and memory.
     """
     base = abs(belt_speed) * np.array(waves_per_metre)
-    few = base[: len(base) * (len(base) <= _MOST_PAIRED)]
+    few = base[: len(base) * (len(base) <= 2000)]
     multiples = np.outer(np.arange(1, MULTIPLES + 1), base)
     families = [multiples, np.add.outer(few, few), np.abs(np.subtract.outer(few, few))]
     lines = np.unique(np.concatenate([family.ravel() for family in families]))

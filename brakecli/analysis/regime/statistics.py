@@ -24,8 +24,6 @@ from brakecli.analysis.spectrum import Array
 from brakecli.solver.alike import at_once, by_rows
 from brakecli.solver.history import History, stacked
 
-_ALIKE = 0.4  # bounds of x over the level of vx, by how far they may leave their final values; a choice
-
 
 class Statistics(NamedTuple):
     """What a history shows, in SI units; nan where the samples are too few for that."""
@@ -76,7 +74,7 @@ def _columns(history: History, within: float) -> dict[str, NDArray[Any]]:
         return columns
     vx, least, largest = _windowed(history)
     final = _final(vx)
-    window = _settled_window((vx, least, largest), within, _ALIKE * within)
+    window = _settled_window((vx, least, largest), within, 0.4 * within)  # the bounds of x by less; a choice
     change, change_error = level_change(vx[:, WINDOWS // 2 :])
     return columns | {
         "change": change,

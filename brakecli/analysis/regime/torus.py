@@ -6,11 +6,6 @@ import numpy as np
 
 from brakecli.analysis.spectrum import FEWEST_CYCLES, Array, interpolated
 
-_ROUNDING = 1e-9  # of the size: nothing is seen of what varies by less
-_FEWEST = 8 * FEWEST_CYCLES  # sizes: lines from `FEWEST_CYCLES` up to half a turn, with their width beside them
-_TWICE = 2  # the phase is compared in both halves: the second time nothing is left of the first error
-_PARTS = 3  # of a turn, at most, after which the strongest line of the sizes repeats
-
 
 def turns_per_cycle(sizes: Array, within: float) -> float:
     """Turns of the size in a cycle, at most a half; nan where the sizes of cycles fill no closed curve.
@@ -22,15 +17,15 @@ def turns_per_cycle(sizes: Array, within: float) -> float:
     leaves out most phases.
     """
     count = len(sizes)
-    if count < _FEWEST:
+    if count < 8 * FEWEST_CYCLES:  # lines lie from `FEWEST_CYCLES` up to half a turn, with their width beside them
         return math.nan
     away = sizes - sizes.mean()
     variance = float(away @ away) / count
-    line = _line(away) if variance > (_ROUNDING * sizes.mean()) ** 2 else math.nan
+    line = _line(away) if variance > (1e-9 * sizes.mean()) ** 2 else math.nan  # less is rounding
     number = np.arange(count, dtype=np.float64)
     if not _left_out(line * number % 1.0) <= within:
         return math.nan
-    for rate in [(line + turn) / parts for parts in range(1, _PARTS + 1) for turn in range(parts)]:
+    for rate in [(line + turn) / parts for parts in range(1, 4) for turn in range(parts)]:
         order = np.argsort(rate * number % 1.0)
         steps = np.diff(away[order], append=away[order[0]])
         if float(steps @ steps) / count <= 2.0 * variance * within**2:
@@ -57,7 +52,7 @@ def _line(values: Array) -> float:
     line = interpolated(np.arange(len(power), dtype=np.float64) / count, power, top)
     place = (np.arange(half) + 0.5) / half
     weights = np.exp(-1.0 / (place * (1.0 - place)))
-    for _ in range(_TWICE):
+    for _ in range(2):  # the second time nothing is left of the first error
         turned = values[: 2 * half] * np.exp(-2j * math.pi * line * np.arange(2 * half))
         first, second = turned.reshape(2, half) @ weights
         line += float(np.angle(second * first.conj())) / (2.0 * math.pi * half)

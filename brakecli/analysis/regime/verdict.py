@@ -6,9 +6,6 @@ from typing import Any
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 from brakecli.solver.motion.flow import Orbit
 
-FADED = 0.01
-"""Part of the level of a damped vibration at its strongest that is nothing any more."""
-
 
 @dataclass(frozen=True)
 class Verdict:
@@ -61,7 +58,7 @@ class Verdict:
         if self.regime is Regime.UNDECIDED:
             return self.decision.longer
         if self.excitation is Excitation.NONE:
-            return not self.settled and self.remaining > FADED
+            return not self.settled and self.remaining > 0.01
         return self.longer
 
     @property

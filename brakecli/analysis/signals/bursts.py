@@ -8,16 +8,8 @@ from scipy.ndimage import uniform_filter1d
 
 from brakecli.analysis.spectrum import FEWEST_CYCLES, Array, interpolated
 
-_FRAMES = 64  # parts of the record, half of which overlap; each holds
-_CYCLES = 8  # cycles of its strongest line at least
-_SHORTEST = 64  # samples of a frame at least
-_FEWEST = 4  # frames of a record at least
-_LOBE = 4.0  # bins that hold the main lobe of a Hann window
-_STANDS_OUT = 20.0  # power of a tone's bin over the mean of the noise, which reaches it in one bin of 5e8
-_SHARE = 0.3  # part of the energy of a frame in its tone
-_FAINT = 1e-3  # part of the power of the loudest frame: less is rounding, or nothing that stands out of the record
+_CYCLES = 8  # of the strongest line of the record in a frame, at least
 _SAME = 0.06  # part of its frequency by which a tone may move from frame to frame
-_MOST = 32
 _Tone = tuple[int, float, float]  # first sample of a frame, and the frequency (1/sample) and power of its tone
 
 
@@ -47,19 +39,21 @@ class Burst:
 
 def bursts(values: Array, interval: float) -> list[Burst]:
     """The bursts of a signal without gaps."""
-    if len(values) < _FEWEST * _SHORTEST or not np.ptp(values):
+    shortest = 64  # samples of a frame
+    fewest = 4  # frames, half of which overlap
+    if len(values) < fewest * shortest or not np.ptp(values):
         return []
     whole = np.abs(np.fft.rfft(np.diff(values) * np.hanning(len(values) - 1)))  # differences, as drift is slow
     period = len(values) / max(FEWEST_CYCLES + int(np.argmax(whole[FEWEST_CYCLES:])), 1)
-    wanted = max(len(values) / _FRAMES, _CYCLES * period, _SHORTEST)
-    size = 1 << int(min(np.ceil(np.log2(wanted)), np.log2(len(values) / _FEWEST)))
+    wanted = max(len(values) / 64, _CYCLES * period, shortest)
+    size = 1 << int(min(np.ceil(np.log2(wanted)), np.log2(len(values) / fewest)))
     groups: list[list[_Tone]] = []
     for tone in _tones(values, size):
         if groups and _lasts(values, size, groups[-1][-1], tone):
             groups[-1].append(tone)
         else:
             groups.append([tone])
-    groups = sorted(groups, key=lambda group: -sum(power for *_, power in group))[:_MOST]
+    groups = sorted(groups, key=lambda group: -sum(power for *_, power in group))[:32]
     results: list[Burst] = []
     for group in groups:
         burst = _burst(values, interval, size, group)
@@ -86,10 +80,11 @@ def _tones(values: Array, size: int) -> list[_Tone]:
         tone = float(power[max(i - 2, 0) : i + 3].sum())
         around = np.median(level[max(_CYCLES - 2, i // 2) : max(2 * i, 4 * _CYCLES)])
         slower = np.median(level[i // 2 : i - 2])  # on the flank of a slow line, more than what is around
-        clear = level[i] > _STANDS_OUT * float(max(around, slower)) / np.log(2.0)
-        if clear and tone >= _SHARE * power.sum():
+        # noise reaches twenty times its mean in one bin of 5e8
+        clear = level[i] > 20.0 * float(max(around, slower)) / np.log(2.0)
+        if clear and tone >= 0.3 * power.sum():  # power of the frame
             tones.append((first, interpolated(frequencies, power, i), tone))
-    return [tone for tone in tones if tone[2] >= _FAINT * loudest]
+    return [tone for tone in tones if tone[2] >= 1e-3 * loudest]  # less is rounding, or stands out of nothing
 
 
 def _lasts(values: Array, size: int, last: _Tone, tone: _Tone) -> bool:
@@ -146,7 +141,7 @@ def _band(values: Array, size: int, frequency: float) -> NDArray[np.complex128]:
     """A tone alone, as it turns: half of its amplitude, and its phase."""
     piece = values - np.linspace(values[0], values[-1], len(values))
     lines = np.fft.fftfreq(len(piece))
-    half = max(_SAME * frequency, _LOBE / size)
+    half = max(_SAME * frequency, 4.0 / size)  # bins that hold the main lobe of a Hann window
     return np.fft.ifft(np.where(np.abs(lines - frequency) <= half, np.fft.fft(piece), 0.0))
 
 

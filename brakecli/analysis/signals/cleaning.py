@@ -11,27 +11,11 @@ from brakecli.analysis.regime.spectra import line_share, rises
 from brakecli.analysis.spectrum import Array
 
 CERTAIN = 15.0  # a line's power over the mean of the noise, which reaches it in one bin of three million
-_RIPPLE = 0.3  # ripple within this part of the mean size of the velocity does not count as a cycle
 _SPIKE_DEVIATIONS = 8.0  # by which a spike leaves the median of its neighbours
 _OUTER = 0.1  # part of the values at each end that the range leaves out, as spikes are there
-_SPIKE_RANGE = 0.35  # part of the signal's range by which it does so, too
-_NOISE_SHARE = 0.6  # most of the variance that noise may be where slips are sought
-_SLOWEST = 60  # parts of the record over which is smoothed at most
-_MOVES = 0.15  # of the largest change of displacement over m samples: what is less has been smoothed away
-_QUIET = 0.02  # and where all else is looked at
 DRIFT_CYCLES = 8.0  # over which drift is averaged
-_COARSE = 24  # whatever is slower than this part of the record is left out where cycles are estimated
 _SHORTEST = 8  # samples in which noise can be told
-_SIDE = 24  # samples before and behind, the louder of which a spike has to leave; a choice
-_OUTER_DEVIATIONS = 1.645  # standard deviations that a tenth of normal numbers leave their middle by
-_BESIDE = 3.0  # times what its neighbours leave the median by, beyond which a sample is alone
-# spikes, and their mean sign, from which on they may be pulses of slip
-_FEWEST_PULSES = 5
-_ONE_WAY = 0.6
-_SHORT_GAP = 0.25  # of a cycle: a straight line over it changes no turning point by much
-_DRIFTS = 0.1  # drift over the motion, both in standard deviations, from which on it is reported
 DEVIATION = 1.4826  # standard deviation of a normal distribution over the median of the distances from its middle
-_LINES_LEFT = 0.5  # part of the energy on three lines that would be left without pulses that are no slips
 
 
 @dataclass(frozen=True)
@@ -67,21 +51,24 @@ class Velocity:
 
     @cached_property
     def scales(self) -> list[tuple[int, float]]:
-        """Smoothings m = 1, 2, 4 … that leave the motion above the noise, with the part of the noise."""
-        every = [1 << k for k in range(max(1, len(self.values) // _SLOWEST).bit_length())]
+        """Smoothings m = 1, 2, 4 … that leave the motion above the noise, with the part of the noise.
+
+        What moves little over m samples, beside the largest change, has been smoothed away.
+        """
+        every = [1 << k for k in range(max(1, len(self.values) // 60).bit_length())]
         sizes = {m: float(self.thinned(m).var()) for m in every}
         noise = {m: self.noise_at(m) / max(size, 1e-300) for m, size in sizes.items()}
         # The noise of high frequencies would hide in a velocity what the displacement shows.
         moves = {m: size if self.measured else m * m * size for m, size in sizes.items()}
-        clear = [m for m in every if noise[m] < _NOISE_SHARE]
+        clear = [m for m in every if noise[m] < 0.6]  # of the variance, at most, where slips are sought
         most = max((moves[m] for m in (clear if self.measured else every)), default=0.0)
-        return [(m, noise[m]) for m in clear if moves[m] >= (_MOVES if self.measured else _MOVES**2) * most]
+        return [(m, noise[m]) for m in clear if moves[m] >= (0.15 if self.measured else 0.15**2) * most]
 
     @cached_property
     def quiet(self) -> int:
         """The least smoothing at which noise is a small part of the variance; otherwise the quietest."""
         parts = [(share, m) for m, share in self.scales]
-        return next((m for share, m in parts if share <= _QUIET), min(parts, default=(1.0, 1))[1])
+        return next((m for share, m in parts if share <= 0.02), min(parts, default=(1.0, 1))[1])
 
     def levels(self, m: int, start: int, windows: int) -> Array:
         """Standard deviations in windows from a sample on, smoothed over m samples, without the noise."""
@@ -109,7 +96,8 @@ def cleaned(values: Array, order: int) -> tuple[Velocity, list[str]]:
     first = 0
     if len(values) >= _SHORTEST and not np.isfinite(values).all():
         cycle = _cycle(_velocity(bridge(values), order > 0))
-        values, first = _longest_piece(values, max(1.0, _SHORT_GAP * cycle), notes)
+        # a straight line over a quarter of a cycle changes no turning point by much
+        values, first = _longest_piece(values, max(1.0, 0.25 * cycle), notes)
         values = bridge(values)
     if len(values) >= _SHORTEST:
         values = _without_spikes(values, order > 0, notes)
@@ -130,7 +118,7 @@ def without_drift(velocity: Velocity, cycle: float, notes: list[str]) -> Velocit
     drift = uniform_filter1d(velocity.values, width)
     m = velocity.quiet
     variance = float(velocity.thinned(m).var()) - velocity.noise_at(m)
-    if float(drift.std()) > _DRIFTS * float(np.sqrt(max(variance, 0.0))):
+    if float(drift.std()) > 0.1 * float(np.sqrt(max(variance, 0.0))):  # of the motion: less is not worth a note
         notes.append("drift removed")
     return replace(velocity, values=velocity.values - drift)
 
@@ -150,15 +138,16 @@ def _velocity(values: Array, is_velocity: bool) -> Velocity:
 
 
 def _cycle(velocity: Velocity) -> float:
-    """Samples of a cycle, roughly."""
+    """Samples of a cycle, roughly: ripple of less than 0.3 of the mean size of the velocity is none."""
     velocity = replace(velocity, values=_without_slow(velocity.values))
     values = velocity.smoothed(velocity.quiet)
-    band = _RIPPLE * float(np.abs(values).mean())
+    band = 0.3 * float(np.abs(values).mean())
     return len(values) / max(1, len(rises(-values, -band, band)))
 
 
 def _without_slow(values: Array) -> Array:
-    mean: Array = uniform_filter1d(values, max(1, len(values) // _COARSE))
+    """Values without what is slower than a 24th of the record."""
+    mean: Array = uniform_filter1d(values, max(1, len(values) // 24))
     return values - mean
 
 
@@ -195,7 +184,7 @@ def _far(values: Array, away: Array) -> Any:
     """By what a spike leaves the median of its neighbours, which others leave by `away`; along the last axis."""
     low, high = np.quantile(values, [_OUTER, 1.0 - _OUTER], axis=-1)
     deviation = DEVIATION * np.median(np.abs(away), axis=-1)
-    return np.maximum(_SPIKE_DEVIATIONS * deviation, _SPIKE_RANGE * (high - low))
+    return np.maximum(_SPIKE_DEVIATIONS * deviation, 0.35 * (high - low))
 
 
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:
@@ -206,19 +195,22 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     away = values - median_filter(values, 5, mode="nearest")
     spikes = np.abs(away) > _far(values, away)
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
-    spikes &= np.abs(away) > _BESIDE * beside
+    spikes &= np.abs(away) > 3.0 * beside
     places = np.flatnonzero(spikes)
-    for side in (np.arange(-_SIDE, 0), np.arange(1, _SIDE + 1)):
+    before, behind = (np.arange(-24, 0), np.arange(1, 25))
+    for side in (before, behind):  # the louder of which a spike has to leave; a choice
         there = np.clip(places[:, None] + side, 0, len(values) - 1)
-        beyond = _SPIKE_DEVIATIONS * np.quantile(np.abs(away[there]), 1.0 - _OUTER, axis=-1) / _OUTER_DEVIATIONS
+        # a tenth of normal numbers leave their middle by more than 1.645 deviations
+        beyond = _SPIKE_DEVIATIONS * np.quantile(np.abs(away[there]), 1.0 - _OUTER, axis=-1) / 1.645
         spikes[places] &= np.abs(away[places]) > np.maximum(_far(values[there], away[there]), beyond)
     count = int(np.sum(spikes))
     if count == 0:
         return values
     without = bridge(np.where(spikes, np.nan, values))
-    if is_velocity and count >= _FEWEST_PULSES and abs(float(np.mean(np.sign(away[spikes])))) > _ONE_WAY:
+    # five, mostly of one sign, may be pulses of slip
+    if is_velocity and count >= 5 and abs(float(np.mean(np.sign(away[spikes])))) > 0.6:
         power = np.abs(np.fft.rfft(_without_slow(without))) ** 2
-        if line_share(power) < _LINES_LEFT:  # nothing is left without them
+        if line_share(power) < 0.5:  # nothing is left without them
             return values
     notes.append(f"spikes removed: {count}")
     return without

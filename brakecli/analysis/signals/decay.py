@@ -8,14 +8,6 @@ from numpy.lib.stride_tricks import sliding_window_view
 
 from brakecli.analysis.spectrum import Array
 
-_WIDTH = 0.75  # cycles, the deviation of a Gaussian window: its spectrum at rest has 1.5e-5 of that at the line
-_REACH = 4.0  # deviations to either side; where the window ends it has 3e-4 of its height
-_HOP = 2.0  # deviations from window to window, of which n have noise in common by the part exp(-n²)
-_IN_COMMON = math.pi**0.25  # times as large is the error of a slope by that: the root of the sum of all exp(-n²)
-_FEWEST = 4  # windows: a line through three has a single number for its error
-_ABOVE = 4.0  # times the noise: up to here its logarithm is off by a thirtieth at most, 1/2 of the square of 1/4
-_AT_ONCE = 1 << 22  # samples
-
 
 @dataclass(frozen=True)
 class Ringing:
@@ -36,20 +28,25 @@ def ringing(values: Array, interval: float, line: float, noise: float, sure_erro
     """
     values = values - np.median(values)
     values = values[int(np.argmax(np.abs(values))) :]
-    half = math.ceil(_REACH * _WIDTH / line)
-    hop = max(1, round(_HOP * _WIDTH / line))
+    # Cycles, the deviation of a Gaussian window: its spectrum at rest has 1.5e-5 of that at the line. At its ends,
+    # four deviations away, it has 3e-4 of its height.
+    width = 0.75
+    half = math.ceil(4.0 * width / line)
+    hop = max(1, round(2.0 * width / line))
     count = (len(values) - 2 * half - 1) // hop + 1
-    if count < _FEWEST:
+    fewest = 4  # a line through three has a single number for its error
+    if count < fewest:
         return None
     places = np.arange(-half, half + 1)
-    window = np.exp(-0.5 * (places * line / _WIDTH) ** 2)
+    window = np.exp(-0.5 * (places * line / width) ** 2)
     wave = window * np.exp(-2j * np.pi * line * places)
     windows = sliding_window_view(values, len(wave))[::hop][:count]
-    step = max(1, _AT_ONCE // len(wave))
+    step = max(1, (1 << 22) // len(wave))  # so many samples at once
     tones = np.concatenate([windows[first : first + step] @ wave for first in range(0, count, step)])
-    faint = np.flatnonzero(np.abs(tones) <= _ABOVE * noise * float(np.linalg.norm(window)))
+    # up to four times the noise its logarithm is off by a thirtieth at most, 1/2 of the square of 1/4
+    faint = np.flatnonzero(np.abs(tones) <= 4.0 * noise * float(np.linalg.norm(window)))
     tones = tones[: faint[0]] if len(faint) else tones
-    if len(tones) < _FEWEST or not np.abs(tones).min() > 0.0:
+    if len(tones) < fewest or not np.abs(tones).min() > 0.0:
         return None
     time = (hop * interval) * np.arange(len(tones)).astype(np.float64)
     weights = np.abs(tones / np.abs(tones).max()) ** 2  # noise moves a logarithm by its part of the tone
@@ -65,10 +62,14 @@ def ringing(values: Array, interval: float, line: float, noise: float, sure_erro
 
 
 def _slope(time: Array, values: Array, weights: Array) -> tuple[float, float]:
-    """The slope of a weighted line, and its standard error by what the line leaves."""
+    """The slope of a weighted line, and its standard error by what the line leaves.
+
+    Windows that are n hops of two deviations apart have noise in common by the part exp(-n²). The error of a slope
+    is larger by the root of the sum of all these.
+    """
     away = time - np.average(time, weights=weights)
     spread = float(weights @ away**2)
     middle = float(np.average(values, weights=weights))
     slope = float(weights @ (away * (values - middle))) / spread
     residual = values - middle - slope * away
-    return slope, _IN_COMMON * math.sqrt(float(weights @ residual**2) / (len(time) - 2) / spread)
+    return slope, math.pi**0.25 * math.sqrt(float(weights @ residual**2) / (len(time) - 2) / spread)

@@ -23,13 +23,9 @@ from brakecli.errors import UnreadableResultError, printable
 from brakecli.results.opening import open_regular
 
 SHORTEST_TRIAL = 5.0  # s of processor time, and 0.1 s for each MB, to read a file that may be damaged
-_WAITING = 10.0  # times as long may it take where other processes or a slow disk hold it up
-_LONGEST = 2000  # characters of what is wrong
 _DEEPEST = 8  # levels of groups and their datasets
 _MOST_NODES = 10_000  # groups and datasets
-_RATIO = 1100  # no filter of HDF5 makes data smaller than this
 _MOST_MEMORY = 1_250_000_000  # bytes of a chunk that is unpacked; a row of numbers takes less
-_LISTED = 12  # datasets in a message
 
 
 def dataset(path: Path, inside: str, most: int) -> tuple[Array, str]:
@@ -52,7 +48,7 @@ def _row(file: h5py.File, inside: str, most: int, length: int) -> tuple[Array, s
     node = _member(file, inside)
     if not isinstance(node, h5py.Dataset):
         names = _datasets(file)
-        raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:_LISTED]) or 'none'}")
+        raise ValueError(f"there is no dataset {inside}, only {', '.join(names[:12]) or 'none'}")
     if not node.shape or sum(size != 1 for size in node.shape) > 1 or node.dtype.kind not in "iuf":
         raise ValueError(f"{inside} is not a row of numbers, found shape {node.shape}, {node.dtype}")
     _check_size(node, length, f"dataset {inside}")
@@ -66,6 +62,7 @@ def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
 
     Raises ValueError where that process is ended, and for its exceptions.
     """
+    longest = 2000  # characters of what is wrong
     reading, writing = os.pipe()
     with warnings.catch_warnings():  # Python 3.12 warns where there are threads; the child uses none of them
         warnings.simplefilter("ignore")
@@ -75,7 +72,7 @@ def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
             for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGALRM):
                 signal.signal(number, signal.SIG_DFL)
             seconds = int(SHORTEST_TRIAL + os.fstat(stream.fileno()).st_size / 1e7)
-            signal.alarm(int(_WAITING * seconds))
+            signal.alarm(int(10.0 * seconds))  # as other processes or a slow disk may hold it up
             resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
             resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
             in_use = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
@@ -85,12 +82,12 @@ def _try_out(stream: FileIO, look: Callable[[h5py.File], object]) -> None:
             with h5py.File(stream, "r") as file:
                 look(file)
         except BaseException as error:
-            os.write(writing, (str(error) or type(error).__name__)[:_LONGEST].encode(errors="replace"))
+            os.write(writing, (str(error) or type(error).__name__)[:longest].encode(errors="replace"))
         finally:
             os._exit(0)
     os.close(writing)
     with FileIO(reading) as pipe:
-        wrong = pipe.read(_LONGEST).decode(errors="replace")
+        wrong = pipe.read(longest).decode(errors="replace")
     if os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) < 0:
         raise ValueError("the file is damaged, and HDF5 cannot read it")
     if wrong:
@@ -137,7 +134,8 @@ def _check_size(node: h5py.Dataset, length: int, where: str) -> None:
     if plist.get_layout() == h5d.CHUNKED:
         chunk = int(np.prod(node.chunks, dtype=object)) * node.dtype.itemsize
     own = plist.get_layout() in (h5d.CHUNKED, h5d.CONTIGUOUS, h5d.COMPACT) and not plist.get_external_count()
-    if not own or stored > length or max(room, chunk * bool(room)) > (_RATIO if packed else 1) * stored:
+    most = (1100 if packed else 1) * stored  # no filter of HDF5 makes data smaller
+    if not own or stored > length or max(room, chunk * bool(room)) > most:
         raise ValueError(f"{where} claims {node.size} values, which are not in the file")
     if packed and chunk > _MOST_MEMORY:
         raise ValueError(f"a chunk of {where} takes {chunk} bytes in memory, and {_MOST_MEMORY} are the most")

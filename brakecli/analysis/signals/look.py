@@ -17,11 +17,6 @@ from brakecli.analysis.signals.table import SignalThresholds, decide
 from brakecli.analysis.spectrum import Array
 from brakecli.results.fields import MEASURED_UNITS
 
-_MOST_OF_IT = 0.9  # of the record: bursts that fill as much are the record
-_MOST_ENERGY = 0.5  # of all bursts in those that speak for the record
-_ALIKE = 0.06  # of its frequency, by which a burst's may differ from that of the strongest one; a choice
-_INSIDE = 0.05  # of a burst, left out at either end
-_LEVEL = 0.3  # change of its logarithm in a burst; a ring-down that is cut at half has 0.7
 _DEFAULT = SignalThresholds()
 FULL_SCALE = "of full scale"
 _SUSTAINED = (Regime.RELAXATION, Regime.QUASI_HARMONIC)
@@ -112,7 +107,7 @@ def look(
     tones = tuple(bursts(without_spikes(signal.values, quantity.order), step))
     verdict = replace(judged.verdict, bursts=tones)
     filled = sum(tone.end - tone.start for tone in tones)
-    if tones and filled < _MOST_OF_IT * len(signal.values) * step and verdict.regime is not Regime.RELAXATION:
+    if tones and filled < 0.9 * len(signal.values) * step and verdict.regime is not Regime.RELAXATION:
         verdict = _of_bursts(signal, settings, verdict)
     return replace(judged, verdict=verdict)
 
@@ -122,17 +117,17 @@ def _of_bursts(signal: Signal, settings: _Settings, whole: SignalVerdict) -> Sig
     tones = whole.bursts
     step = signal.interval
     burst = max(tones, key=lambda tone: tone.energy)
-    like = [tone for tone in tones if abs(tone.frequency - burst.frequency) <= _ALIKE * burst.frequency]
+    like = [tone for tone in tones if abs(tone.frequency - burst.frequency) <= 0.06 * burst.frequency]  # a choice
     when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s"
     if len(like) > 1:
         when = f"in {len(like)} bursts, the strongest from {burst.start:.4g} to {burst.end:.4g} s"
-    if sum(tone.energy for tone in like) >= _MOST_ENERGY * sum(tone.energy for tone in tones):
+    if sum(tone.energy for tone in like) >= 0.5 * sum(tone.energy for tone in tones):
         begin, end = (int(time / step) for time in (burst.start, burst.end))
-        margin = int(_INSIDE * (end - begin))
+        margin = int(0.05 * (end - begin))  # in which it begins and ends
         piece = replace(signal, values=signal.values[begin + margin : end - margin])
         inside = _judge(piece, *settings).verdict if np.isfinite(piece.values).any() else whole
         sustained = inside.regime in _SUSTAINED and inside.evidence["steady_from"] == 0.0
-        if sustained and abs(inside.evidence["level_change"]) < _LEVEL:
+        if sustained and abs(inside.evidence["level_change"]) < 0.3:  # a ring-down that is cut at half has 0.7
             line = burst.frequency if inside.regime is Regime.QUASI_HARMONIC else inside.frequency
             said = (f"{when}: {inside.reasons[0]}",)
             return replace(inside, reasons=said, frequency=line, bursts=tones, warnings=whole.warnings)

@@ -14,22 +14,8 @@ from brakecli.analysis.signals.slips import Slips
 from brakecli.analysis.signals.table import FEWEST_SAMPLES, SignalAnswers, SignalThresholds, steady
 from brakecli.analysis.spectrum import Array, interpolated
 
-_FINE = 1000.0  # samples of a cycle, after interpolation, among which a plateau is sought
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
-_SHORTEST_PLATEAU = 0.03  # of the time
-_WIDTHS: tuple[float, ...] = 0.02, 0.01, 0.005  # half widths of a plateau that are tried, over the amplitude
-_NEXT = 3.0  # times that width: what lies within is next to a plateau
-_OF_A_PEAK = 32.0  # samples of a cycle, interpolated: the largest is 1/2 % below the peak at most, (π/32)²/2
-_BIN = 0.01  # of the amplitude, in which the most frequent velocities are counted
-_TAIL = 0.01  # of the time, in which the velocity may go beyond its range
-# least and largest velocity, over the belt's, that reaches the belt's just so
-_SLOWER = 0.95
-_FASTER = 1.2
 _WINDOW_CYCLES = 3.0  # fewer cycles in a window do not have a level
-_FEWEST_WINDOWS = 10  # from which on a level has an error, which takes ten batches
-_MOST_HIDDEN = 0.2  # part of a level that noise may hide: beyond, what has died is not told from what lasts
-_OVERTONES = np.arange(3, 9)  # multiples of a line that two lines in step lack
-_APART = 0.03  # part of an overtone within which its line is sought
 
 
 class Heard:
@@ -81,7 +67,8 @@ class Heard:
         held[tones] = (noise * np.ones(len(spectrum)))[tones] / np.abs(gain[tones]) ** 2
         x = np.zeros(len(spectrum), np.complex128)
         x[tones] = spectrum[tones] / gain[tones]
-        finer = int(np.ceil(_OF_A_PEAK * often)) if count <= _PLATEAU_SAMPLES else 1
+        # of 32 samples of a cycle the largest is 1/2 % below the peak at most, (π/32)²/2
+        finer = int(np.ceil(32.0 * often)) if count <= _PLATEAU_SAMPLES else 1
         moved = finer * np.fft.irfft(x, finer * count)
         middle = slice(len(moved) // 4, 3 * len(moved) // 4)
         moved = moved[middle] / np.interp(np.arange(len(moved))[middle] / finer, np.arange(count), window)
@@ -105,11 +92,12 @@ class Heard:
     def level(self) -> dict[str, Any]:
         """Whether it lasts."""
         velocity = self.velocity
-        windows = max(self.windows, _FEWEST_WINDOWS)
+        windows = max(self.windows, 10)  # the error of a level takes ten batches
         levels = velocity.levels(self.smoothing, 0, windows)
         largest = max(float(np.sort(levels)[-3]), 1e-300)
         died_to = float(levels[-(windows // 4) :].mean()) / largest
-        hidden = min(_MOST_HIDDEN, 0.5 * float(np.sqrt(velocity.noise_at(self.smoothing))) / largest)
+        # where noise may hide more, what has died is not told from what lasts
+        hidden = min(0.2, 0.5 * float(np.sqrt(velocity.noise_at(self.smoothing))) / largest)
         least = max(self.limits.negligible, hidden) * largest
         for steady_from in (0.0, 0.5):
             there = velocity.levels(self.smoothing, int(steady_from * self.samples), windows)
@@ -123,7 +111,8 @@ class Heard:
     def harmony(self) -> dict[str, float]:
         """Parts of the energy that tell lines in step from stick."""
         total = max(float(self.power.sum()), 1e-300)
-        first, last = (((1.0 + off) * _OVERTONES * self.strongest).astype(int) for off in (-_APART, _APART))
+        overtones = np.arange(3, 9)  # which two lines in step lack
+        first, last = (((1.0 + off) * overtones * self.strongest).astype(int) for off in (-0.03, 0.03))
         turn = 2.0 * np.pi * min(4.0 * self.cycles / self.samples, 0.5)
         gain = 1.0 if self.velocity.measured else 2.0 - 2.0 * np.cos(turn)
         noise = CERTAIN * self.samples * self.velocity.noise**2 * gain
@@ -135,31 +124,36 @@ class Heard:
         }
 
     def stay(self) -> dict[str, Any]:
-        """How long the velocity stays at that of the belt, or at an extreme one."""
-        finer = int(np.ceil(_FINE * self.cycles / self.samples))
+        """How long the velocity stays at that of the belt, or at an extreme one.
+
+        A plateau is sought among 1000 samples of a cycle, interpolated, by three half widths over the amplitude.
+        """
+        tail = 0.01  # of the time, in which the velocity may go beyond its range
+        finer = int(np.ceil(1000.0 * self.cycles / self.samples))
         mean = self.velocity.mean
         clean = self.clean[: _PLATEAU_SAMPLES // finer]
         clean = finer * np.fft.irfft(np.fft.rfft(clean), finer * len(clean))
-        reach = 0.5 * float(np.ptp(np.quantile(clean, [_TAIL, 1.0 - _TAIL]))) or 1.0
+        reach = 0.5 * float(np.ptp(np.quantile(clean, [tail, 1.0 - tail]))) or 1.0
         levels = np.array([self.belt, -self.belt]) - mean
         if not math.isfinite(self.belt):
             # the most frequent values of the lower and of the upper quarter of the range
-            edges = clean.min() + _BIN * reach * np.arange(float(np.ptp(clean)) / (_BIN * reach) + 2.0)
+            cell = 0.01 * reach
+            edges = clean.min() + cell * np.arange(float(np.ptp(clean)) / cell + 2.0)
             counts = np.histogram(clean, edges)[0]
             quarter = max(1, len(edges) // 4)
             places = np.array([np.argmax(counts[:quarter]), len(counts) - quarter + np.argmax(counts[-quarter:])])
             levels = 0.5 * (edges[places] + edges[places + 1])
         times = [(0.0, 1.0)]  # at a level, and next to it
-        for level, width in product(levels, _WIDTHS):
+        for level, width in product(levels, (0.02, 0.01, 0.005)):
             away = np.abs(clean - level) / reach
-            if (there := float(np.mean(away <= width))) >= _SHORTEST_PLATEAU:
-                times.append((there, float(np.mean(away <= _NEXT * width)) - there))
+            if (there := float(np.mean(away <= width))) >= 0.03:  # of the time
+                times.append((there, float(np.mean(away <= 3.0 * width)) - there))
         top, beside = max(times, key=lambda time: time[0] / max(time[1], 1e-9))
-        least, most = np.quantile(self.clean + mean, [_TAIL, 1.0 - _TAIL])
+        least, most = np.quantile(self.clean + mean, [tail, 1.0 - tail])
         return {
             "plateau": top / max(beside, 1e-9),
             "sticks": max(0.0, top - 0.5 * beside),
-            "reaches": any(_SLOWER * self.belt <= v <= _FASTER * self.belt for v in (-least, most)),
+            "reaches": any(0.95 * self.belt <= v <= 1.2 * self.belt for v in (-least, most)),  # just so
         }
 
 

@@ -29,23 +29,11 @@ _SI = {
     Measurand.ACCELERATION: ("meter / second ** 2", "kilogram"),  # g, a gram to pint, is taken for gravity
     Measurand.PRESSURE: ("kilogram / meter / second ** 2",),
 }
-_GRAVITY = 9.80665e3  # m/s² over the gram's size in kg
-_UNEVEN = 0.01  # part of the step by which steps may differ before the signal is resampled
 _MOST_SAMPLES = 50_000_000
-_CHUNK_NAME = 4  # bytes, of which there are none at the end
-# formats of a WAV file whose samples are numbers
-_INTEGERS = 1
-_FLOATS = 3
-_EXTENSIBLE = 0xFFFE
-_LARGEST = 1e100  # value: its square, and sums of squares, are still finite
-_GRAMS = 1e-3  # kg: a `g` is read as a gram, and means the acceleration of gravity
 _PART = "give a part of the record"
 # s between samples
 _NEAREST = 1e-12
 _FARTHEST = 1e12
-_GAP = 1.5  # steps of this many times the usual one are gaps
-_LONGEST = 10.0  # gaps may make a signal so many times as long; a record with longer gaps is mostly gap
-
 _JUMPS = (
     "a force of the contact jumps where slip ends, and {} force is that of the spring, which does not: "
     "regime and frequency may be wrong; classify the velocity, or the result itself"
@@ -137,10 +125,10 @@ def _size(of_file: tuple[float, str] | None, option: str | None, *wanted: str) -
             raise UsageError(f"{name}: {another}; leave the option out")
         of_file = of_option
     size, base = of_file or (1.0, "")
-    if base == "kilogram" and size > _GRAMS:
+    if base == "kilogram" and size > 1e-3:  # a `g` is read as a gram, and means the acceleration of gravity
         what = f"acceleration is in m/s^2 or g, not in kilograms; correct the unit, or {argument('quantity')}"
         raise UsageError(what) if option else UnreadableResultError(what)
-    return size * _GRAVITY if base == "kilogram" else size
+    return size * 9.80665e3 if base == "kilogram" else size  # m/s² over the gram's size in kg
 
 
 def _written(text: str, option: str | None, quantity: Measurand) -> tuple[float, str] | None:
@@ -161,7 +149,7 @@ class _Sound(BytesIO):
 
     def read(self, size: int | None = -1) -> bytes:
         data = super().read(size)
-        if len(data) < (size or 0) and size != _CHUNK_NAME:
+        if len(data) < (size or 0) and size != 4:  # bytes of a chunk's name, of which there are none at the end
             raise ValueError(f"a part of it declares {size} bytes and holds {len(data)}")
         return data
 
@@ -176,7 +164,8 @@ def _sound(path: Path, column: str | None, sample_rate: float | None) -> tuple[A
             f"{'>' if data[:4] == b'RIFX' else '<'}HHQHH", data, start
         )
         layout = f"{channels} channels of {bits} bits are in blocks of {block} bytes"
-        damaged = kind in (_INTEGERS, _FLOATS, _EXTENSIBLE) and not 0 < channels * bits <= 8 * block
+        # the formats whose samples are numbers: whole ones, others, and those that say it elsewhere
+        damaged = kind in (1, 3, 0xFFFE) and not 0 < channels * bits <= 8 * block
         _require(not damaged, f"its header contradicts itself, as {layout}; name an intact WAV file")
     try:
         with warnings.catch_warnings():
@@ -212,30 +201,32 @@ def _numbers(values: Array) -> Array:
     _require(len(numbers) > 0, "the column holds no numbers; name another column")
     _require(len(numbers) > 1, "there is only one sample; measure longer")
     limit = "values beyond 1e100 cannot be measured; name another column, or use SI units"
-    _require(np.abs(numbers).max() <= _LARGEST, limit)
+    _require(np.abs(numbers).max() <= 1e100, limit)  # sums of squares are still finite
     _require(np.ptp(numbers) != 0.0, f"the signal is constant, all values are {numbers[0]:g}; name another column")
     return np.where(good, values, np.nan)
 
 
 def _evenly(values: Array, times: Array) -> Signal:
-    """The signal over equal steps of time; jumps of time become gaps."""
+    """The signal over equal steps of time; jumps of time become gaps, and steps that differ are resampled."""
+    gap = 1.5  # usual steps
+    uneven = 0.01  # part of a step
     _require(np.isfinite(times).all(), "a time is not a number; remove the rows without a time")
     steps = np.diff(times)
     row = int(np.argmin(steps > 0.0)) + 2
     _require(steps.min() > 0.0, f"time does not increase at sample {row}; sort the rows and remove repeated times")
-    within = steps[steps < _GAP * np.median(steps)]
+    within = steps[steps < gap * np.median(steps)]
     step = float(within.mean())
-    if float(np.abs(steps - step).max()) <= _UNEVEN * step:
+    if float(np.abs(steps - step).max()) <= uneven * step:
         return Signal(values, float(times[-1] - times[0]) / (len(times) - 1))
     count = int((times[-1] - times[0]) / step + 1.5)
-    _require(count <= _LONGEST * len(times), "most of the record is gaps; give a part without long gaps")
+    _require(count <= 10.0 * len(times), "most of the record is gaps; give a part without long gaps")
     grid = times[0] + step * np.arange(count)
     even = np.interp(grid, times, values)  # NaN spreads to both sides of a missing value
-    jumps = np.flatnonzero(steps >= _GAP * step)
+    jumps = np.flatnonzero(steps >= gap * step)
     for i in jumps:
         first, last = np.searchsorted(grid, [times[i] + 0.5 * step, times[i + 1] - 0.5 * step])
         even[first:last] = np.nan
     notes = [f"jumps in time, treated as gaps: {len(jumps)}"] if len(jumps) else []
-    if float(np.abs(within - step).max()) > _UNEVEN * step:
+    if float(np.abs(within - step).max()) > uneven * step:
         notes.append(f"the samples were not equally spaced and were resampled at {1.0 / step:.6g} Hz")
     return Signal(even, step, tuple(notes))

@@ -17,21 +17,9 @@ from brakecli.analysis.signals.cleaning import DEVIATION, Velocity
 from brakecli.analysis.signals.table import FEWEST_SAMPLES
 from brakecli.analysis.spectrum import Array
 
-_PARTS = 7
-_BULK = 3.0  # robust deviations that a slip leaves the velocity in stick by
 _FEWEST = 10  # slips, below which their shape is not looked at
-_FEWEST_STRONG = 3
-_SURE = 4.0  # standard errors and deviations of noise, which chance does not reach
-_AGAIN = 0.25  # of the velocity in stick, in the other direction, beyond which a slip has begun
-_STRONG = 0.4  # of the tenth largest slip: the shape of smaller ones is not looked at
 _MOST = 512  # slips whose shape is averaged
-_LASTS = 0.55  # least part of a slip that is left a quarter of a cycle later
-_SWINGS = 0.6  # most that goes the other way
 _AROUND = 5  # widths of a slip in which it would swing
-_NARROW = 2  # samples of a pulse of velocity that may be a spike
-_REGULAR = 0.3  # of the median: quartiles of the times between pulses that spikes do not keep
-_LOADED_LEAST = 0.4  # least correlation of slips with the times that have loaded them
-_LOADED_BY_CHANCE = 2.5  # over √n: a correlation of n pairs that chance does not reach
 
 
 @dataclass(frozen=True)
@@ -59,19 +47,20 @@ class Slips:
     @property
     def stick_slip(self) -> bool:
         """Whether they can be slips between sticks."""
-        return self.lasts >= _LASTS and self.swings <= _SWINGS and self.loaded
+        return self.lasts >= 0.55 and self.swings <= 0.6 and self.loaded
 
 
 def seek(velocity: Velocity, certain: float) -> Slips:
     """The slips at the smoothing that shows them best, if the skewness is `certain`; otherwise at a quiet one."""
     if len(velocity.values) < FEWEST_SAMPLES:
         return Slips()
+    sure = 4.0  # standard errors and deviations of noise, which chance does not reach
     largest = 0.0
     sign = 1.0
     scale = velocity.quiet
     for m, _ in velocity.scales:
         skewness = _skewness(velocity.thinned(m))
-        if abs(skewness) > max(largest, _SURE * np.sqrt(6.0 * m / len(velocity.values))):
+        if abs(skewness) > max(largest, sure * np.sqrt(6.0 * m / len(velocity.values))):
             largest = abs(skewness)
             sign = -np.sign(skewness)
             scale = m
@@ -84,16 +73,16 @@ def seek(velocity: Velocity, certain: float) -> Slips:
         return Slips(largest)
     middle = float(np.median(bulk))
     noise = float(np.sqrt(velocity.noise_at(scale)))
-    spread = middle + _BULK * DEVIATION * float(np.median(np.abs(bulk - middle))) if largest >= certain else 0.0
-    high = max(0.5 * middle, _SURE * noise, spread)
-    places = rises(-values, -_AGAIN * middle, high)
+    spread = middle + 3.0 * DEVIATION * float(np.median(np.abs(bulk - middle))) if largest >= certain else 0.0
+    high = max(0.5 * middle, sure * noise, spread)
+    places = rises(-values, -0.25 * middle, high)  # of the velocity in stick, the other way: a slip has begun
     slips = Slips(largest, scale, places, stick=float(np.mean(values > -high)))
     return _shaped(slips, chosen) if slips.count >= _FEWEST else slips
 
 
 def _skewness(values: Array) -> float:
     """Median of the parts of the record, which a single jump does not change."""
-    parts = [piece - piece.mean() for piece in np.array_split(values, _PARTS)]
+    parts = [piece - piece.mean() for piece in np.array_split(values, 7)]
     return float(np.median([np.mean(p * p * p) / max(float(np.mean(p * p)), 1e-100) ** 1.5 for p in parts]))
 
 
@@ -103,8 +92,8 @@ def _shaped(slips: Slips, velocity: Velocity) -> Slips:
     x = np.concatenate([[0.0], np.cumsum(velocity.values)])
     # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
     starts, depths = _falls(uniform_filter1d(x, 1 + scale // 2), slips.places, scale)
-    strong = depths >= _STRONG * np.sort(depths)[-min(_FEWEST, len(depths)) :][0] if len(depths) else depths > 0.0
-    if strong.sum() < _FEWEST_STRONG:
+    strong = depths >= 0.4 * np.sort(depths)[-min(_FEWEST, len(depths)) :][0] if len(depths) else depths > 0.0
+    if strong.sum() < 3:
         return slips
     lasts = _lasting(x, starts[strong], scale) / max(float(depths[strong].mean()), 1e-300)
     returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
@@ -167,12 +156,13 @@ def _lasting(x: Array, starts: NDArray[np.intp], scale: int) -> float:
 
 def _loaded(values: Array, starts: NDArray[np.intp], depths: Array, scale: int) -> bool:
     """Whether pulses are wider than spikes, or come regularly, or go with the time before or after them."""
-    wide = scale + 2 * _NARROW
+    narrow = 2  # samples of a pulse that may be a spike
+    wide = scale + 2 * narrow
     pulses = sliding_window_view(values, wide)[np.minimum(starts, len(values) - wide)]
     waits = np.diff(starts)
     first, median, last = np.quantile(waits, [0.25, 0.5, 0.75])
     width = np.median((pulses < 0.5 * pulses.min(axis=1, keepdims=True)).sum(axis=1))
-    if width > _NARROW or last - first < _REGULAR * median:
+    if width > narrow or last - first < 0.3 * median:
         return True
     along = np.corrcoef([depths[1:], depths[:-1], waits])[2, :2]
-    return bool(np.nanmax(along) >= max(_LOADED_LEAST, _LOADED_BY_CHANCE / np.sqrt(len(waits))))
+    return bool(np.nanmax(along) >= max(0.4, 2.5 / np.sqrt(len(waits))))  # chance does not reach 2.5/√n

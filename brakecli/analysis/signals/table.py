@@ -10,7 +10,6 @@ from brakecli.analysis.regime.decision import Decision, Regime, Row, first
 from brakecli.faces import argument
 
 FEWEST_SAMPLES = 64
-_TELLS = 3.0  # times the noise of a line, beyond which energy is told from it; a choice
 
 
 @dataclass(frozen=True)
@@ -143,7 +142,8 @@ ROWS: tuple[Row[SignalAnswers, SignalThresholds], ...] = (
     Row(
         "slips or lines",
         lambda motion, limits: (
-            _skewed(motion, limits) and motion.noise_share > _lacks(motion, limits) / _TELLS > 0.0
+            # energy of three times the noise of a line is told from it; a choice
+            _skewed(motion, limits) and motion.noise_share > _lacks(motion, limits) / 3.0 > 0.0
         ),
         "stick, or lines in phase, have skewed the velocity, and noise hides which of them",
         "measure with less noise, or for longer",

@@ -26,26 +26,9 @@ from brakecli.solver.steady_sliding import sliding, tabulated
 
 KEYS = ("*.mass", "*.stiffness", "*.damping", "*.angle_deg", "load.*")
 """What may be advised: masses, stiffnesses, dampings, angles and the load."""
-# values may be advised up to this factor away; steps of a ladder each way
-FACTOR = 10.0
-RUNGS = 40
-DEGREE = 1.0  # step of angles on a ladder, which may be advised up to ±90°
-_LEAST = 1e-6  # least advice where the value is 0, over what is large for it
-_DECOUPLED = 0.0  # °, where a link does not couple x and y: a shoe may be stable there alone
+FACTOR = 10.0  # up to which away values may be advised
 _IDLE = ("initial", "solver", "output")  # steady sliding does not depend on these tables
-# of a derivative, as a part of the value; averages over roughness are noisy, and bend: there a half is tried, too
-_STEP = 1e-3
-_ROUGH_STEP = 0.1
-_ROUNDING = 1e-12  # of an answer
-_FARTHER = 1.2  # times the critical friction: up to there a changed case is searched for its own
-# a search for the critical friction goes on so far beyond what has to be safe
-_ROOM = 1.01
-_LEAST_ROOM = 0.01
-_NEARBY = 1e-6  # of the way from the value before: a bisection that ends so close to 0° has found 0°
-# of advice; 17 are all that a number has
-_FEWEST_DIGITS = 4
-_MOST_DIGITS = 16
-_SURE = 0.05  # largest relative error of a derivative; beyond it there is none, as where the answer jumps
+_FEWEST_DIGITS = 4  # of advice
 
 Path = tuple[str, ...]
 Number = float | tuple[float, ...]
@@ -177,7 +160,8 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
     if path[0] in _IDLE:
         zero = None if critical is None else 0.0
         return Sensitivity(parameter, value, zero if at else None, zero, zero, 0.0)
-    up_to = min(LARGEST_FRICTION, _FARTHER * critical) if critical else case.friction.coefficient + 0.1
+    # a changed case is searched for its own critical friction up to there
+    up_to = min(LARGEST_FRICTION, 1.2 * critical) if critical else case.friction.coefficient + 0.1
 
     @cache
     def answer_at(x: float) -> Answer | None:
@@ -187,7 +171,8 @@ def sensitivity(case: Case, path: Path, critical: float | None, tell: Tell) -> S
         return answer(there, up_to) if there else None
 
     noisy = _rough(case) and (path[0] == "roughness" or path[-1] == "half_length")
-    step = (_ROUGH_STEP if noisy else _STEP) * (abs(at) or _scale(case, parameter))
+    # averages over roughness are noisy, and bend
+    step = (0.1 if noisy else 1e-3) * (abs(at) or _scale(case, parameter))
     steps = [step, 0.5 * step] if noisy else [step]
     slope, error = _surest(lambda x: getattr(answer_at(x), "critical", None), at, steps)
     rate, _ = _surest(lambda x: getattr(answer_at(x), "growth", None), at, steps)
@@ -205,7 +190,7 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
     parameter = ".".join(path)
     assert isinstance(value, float)
     low, high = _bounds(case, parameter, value)
-    decoupled = (_DECOUPLED,) if _is_angle(parameter) else ()
+    decoupled = (0.0,) if _is_angle(parameter) else ()  # a shoe may be stable there alone
 
     @cache
     def safe(x: float) -> bool:
@@ -215,7 +200,7 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         slower = changed(there, ("friction", "coefficient"), least) if there else None
         if there is None or slower is None or (_rough(case) and _grows(slower)):  # a search takes long there
             return False
-        reached = answer(there, _ROOM * least + _LEAST_ROOM)
+        reached = answer(there, 1.01 * least + 0.01)  # a little farther than it has to be safe
         return reached is not None and reached.safe(least) and _is_pressed(there, least)
 
     def last(there: float, beyond: float) -> float:
@@ -235,10 +220,10 @@ def advised(case: Case, path: Path, margin: float, tell: Tell) -> Change:
         before = way[number - 1].value
         to = last(there, before)
         until = None
-        if there in decoupled and abs(to - there) < _NEARBY * abs(before - there):
+        if there in decoupled and abs(to - there) < 1e-6 * abs(before - there):  # so close it has found 0°
             to = there
         if value == 0.0 and not decoupled:  # the least value may be as small as one likes
-            to = max(to, min(there, _LEAST * high))
+            to = max(to, min(there, 1e-6 * high))
         if not _rough(case):
             after = list(takewhile(lambda question: safe(question.value), way[number:]))
             ends = [question.value for question in way[number + len(after) :]] or [high if there > value else low]
@@ -286,7 +271,7 @@ def _distance(parameter: str, start: float, to: float) -> float:
 
 def _shown(to: float, up: bool, safe: Callable[[float], bool]) -> str:
     """A safe value in few digits, rounded onwards, or in as many as it takes to be safe."""
-    texts = (rounded(to, up, digits) for digits in range(_FEWEST_DIGITS, _MOST_DIGITS + 1))
+    texts = (rounded(to, up, digits) for digits in range(_FEWEST_DIGITS, 17))
     return next((text for text in texts if safe(float(text))), repr(to))
 
 
@@ -335,10 +320,10 @@ def _grows(case: Case) -> bool:
 def _ladders(case: Case, parameter: str, value: float) -> Iterator[list[float]]:
     """The values that are tried, upwards and downwards, nearest first; from 0 on upwards alone."""
     if parameter.endswith("_deg"):
-        for end, step in ((90.0, DEGREE), (-90.0, -DEGREE)):
+        for end, step in ((90.0, 1.0), (-90.0, -1.0)):
             yield [value, *np.arange(value + step, end, step).tolist(), end]
         return
-    powers = FACTOR ** (np.arange(1, RUNGS + 1) / RUNGS)
+    powers = FACTOR ** (np.arange(1, 41) / 40)
     if value:
         yield [value, *(value * powers).tolist()]
         yield [value, *(value / powers).tolist()]
@@ -370,11 +355,11 @@ def _derivative(f: Callable[[float], float | None], x: float, step: float) -> tu
         return None, None
     # Richardson: both are of second order
     slope = fine + (fine - coarse) / 3.0
-    noise = _ROUNDING * abs(at) / step
+    noise = 1e-12 * abs(at) / step  # by the rounding of an answer
     if abs(slope) <= noise:
         return 0.0, 0.0
     error = (abs(fine - coarse) + noise) / abs(slope)
-    return (slope, error) if error <= _SURE else (None, None)
+    return (slope, error) if error <= 0.05 else (None, None)  # as where the answer jumps
 
 
 def _difference(f: Callable[[float], float | None], x: float, step: float) -> float | None:

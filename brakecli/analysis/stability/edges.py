@@ -20,10 +20,6 @@ from brakecli.case.system import system_of
 from brakecli.solver.links import sin_cos, tensor
 from brakecli.solver.steady_sliding import PRESSED
 
-_REAL = 1e-3
-"""Largest imaginary part of a root over its size: rounding moves double ones, and one too many is harmless."""
-_LEFT = 1e-13  # largest coefficient that rounding may have left, over the largest one
-
 
 def middles(case: Case, keys: Sequence[str], low: float, high: float) -> list[float]:
     """A value between each two edges in a range of a key: stability is the same at all others between them.
@@ -102,8 +98,9 @@ def _real_roots(condition: Any) -> list[float]:
     coefficients = np.atleast_1d(getattr(condition, "coef", 0.0))
     size = float(np.abs(coefficients).max())
     real = list[float]()
-    for least in (0.0, _LEFT * size):
+    for least in (0.0, 1e-13 * size):
         with suppress(np.linalg.LinAlgError):  # numbers beyond all bounds
             roots = polynomial.polyroots(polynomial.polytrim(coefficients, least))
-            real += [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root)]
+            # rounding moves double ones, and one too many is harmless
+            real += [float(root.real) for root in roots if abs(root.imag) <= 1e-3 * abs(root)]
     return real

@@ -31,18 +31,7 @@ from brakecli.solver.quantities import ContactState
 from brakecli.solver.schedules import value_at
 from brakecli.solver.system import System
 
-_BEYOND = 64.0  # times as long as the run
-# blocks of time for each wave at most, and times in each of them
-_DENSE = 128
-_MOST_DENSE = 1024
-_SCATTERED: Array = np.arange(_MOST_DENSE, dtype=np.float64) * 0.6180339887498949 % 1.0  # evenly, without a period
-_PER_PERIOD = 8.0  # times of a block in a period of the fastest wave; the best are then refined
-_NEAR: Array = np.linspace(-1.0, 1.0, 33) / _PER_PERIOD
-_HIGHEST = 32  # blocks that are looked at so closely
 _FEW = 32  # blocks of one product, which is so small that it wakes no threads
-_ROUNDING = 1e-12  # of the largest eigenvalue: what a growth rate of zero may be off
-_WEAK = 0.25  # square of what waves answer a mode by, below which the second order is enough
-_ROUNDING_WITH_SLOPES = 1e-9  # the same where the passing waves enter it
 
 
 @dataclass(frozen=True)
@@ -123,7 +112,7 @@ def parts(theories: Sequence[Linear], x: Array, time: Array) -> tuple[Array, Arr
     high = lasting.max(axis=1)
     low = lasting.min(axis=1)
     if waves.shape[1] > 1 and theories[0].belt:
-        beyond = _extremes(theories[0], waves, _BEYOND * time[-1])
+        beyond = _extremes(theories[0], waves, 64.0 * time[-1])  # times as long as the run
         high = np.maximum(high, beyond[0])
         low = np.minimum(low, beyond[1])
     return 0.5 * (high - low), lasting, x - equilibrium - lasting
@@ -161,7 +150,8 @@ def _extremes(theory: Linear, waves: Complex, span: float) -> tuple[Array, Array
         peaks.append((x.argmax(axis=1), x.argmin(axis=1)))  # in half the time of max and min
         sizes.append([x[block, time] for time in peaks[-1]])
     order = np.array(sizes).argsort(axis=2)
-    highest = np.stack([order[:, 0, -_HIGHEST:], order[:, 1, :_HIGHEST]], axis=1)
+    count = 32  # of each
+    highest = np.stack([order[:, 0, -count:], order[:, 1, :count]], axis=1)
     times = np.take_along_axis(np.array(peaks), highest, axis=2)
     tops = np.take_along_axis(begins[:, None], highest[:, :, None], axis=3) * np.moveaxis(turns[:, times], 0, 2)
     extremes = (tops.swapaxes(2, 3) @ near).imag
@@ -175,13 +165,14 @@ def _blocks(frequencies: tuple[float, ...], span: float) -> tuple[Complex, Compl
     Where so many blocks do not fill the span, they are scattered over it. The third are both parts of the second.
     """
     speeds = 2.0 * math.pi * np.array(frequencies)
-    size = min(_DENSE * len(frequencies), _MOST_DENSE)
-    apart = 1.0 / (_PER_PERIOD * max(map(abs, frequencies)))
+    size = min(128 * len(frequencies), 1024)  # blocks at most, and times in a block
+    apart = 1.0 / (8.0 * max(map(abs, frequencies)))  # an eighth of the fastest wave; the best are then refined
     count = min(size, _FEW * math.ceil(span / (apart * size * _FEW)))
     filled = apart * size * count >= span
     size = min(size, math.ceil(span / (apart * count)))
-    begins = span * (np.arange(count) / count if filled else _SCATTERED[:count])
-    times = (begins, apart * np.arange(size), _PER_PERIOD * apart * _NEAR)
+    scattered = np.arange(count) * 0.6180339887498949 % 1.0  # evenly, without a period
+    begins = span * (np.arange(count) / count if filled else scattered)
+    times = (begins, apart * np.arange(size), apart * np.linspace(-1.0, 1.0, 33))
     first, turns, near = (np.exp(1j * np.outer(speeds, time)) for time in times)
     return first, turns, np.concatenate([turns.real, turns.imag], dtype=np.float32), near
 
@@ -324,7 +315,7 @@ def _modes(systems: Sequence[System], moves: Array, grip: Array) -> _Modes:
         values[i], vectors[i, :2] = eigensystem(system.coefficients, system.contact_stiffness, float(grip[i]))
     vectors[:, 2:] = vectors[:, :2] * values[:, None]
     growth = values.real.max(axis=1)
-    known_to = np.where(undamped, 0.0, _ROUNDING * np.abs(values).max(axis=1))
+    known_to = np.where(undamped, 0.0, 1e-12 * np.abs(values).max(axis=1))  # rounding
     return _Modes(values, vectors, np.where(np.abs(growth) > known_to, growth, 0.0), known_to)
 
 
@@ -348,8 +339,8 @@ def _with_slopes(own: _Modes, push: Array, passing: Array, slopes: Complex, bend
     moved = residues * (mean[:, None] + 0.25 * (answers * sizes**2).sum(axis=2))
     strong = (0.5 * np.abs(answers) * sizes).sum(axis=2).max(axis=1) + np.abs(bends).sum(axis=1)
     rates = (values + moved).real
-    holds = np.isfinite(rates).all(axis=1) & (strong**2 < _WEAK)
-    off = np.abs(moved).max(axis=1) * strong**2 + _ROUNDING_WITH_SLOPES * np.abs(values).max(axis=1)
+    holds = np.isfinite(rates).all(axis=1) & (strong**2 < 0.25)  # weak enough for the second order
+    off = np.abs(moved).max(axis=1) * strong**2 + 1e-9 * np.abs(values).max(axis=1)
     growth = np.where(holds, rates.max(axis=1), own.growth)
     known_to = np.where(holds, off, math.inf)
     return own._replace(growth=growth, known_to=known_to)

@@ -20,14 +20,6 @@ Margin = Callable[[float], Sequence[Rounded] | None]
 DIVERGENCE = 0
 FLUTTER = 1
 """Places of both conditions in a margin."""
-SURE = 3.0
-"""Standard errors of the mean of windows of the waves that a bar holds; a choice."""
-_HIDDEN = 4.0  # errors below zero that rounding alone does not reach, see `_locate`
-_CLOSE = 4.0  # units of rounding beside a root, where the sides of a change are asked first
-_WIDER = 8.0  # by which that becomes more
-_AT_ENDS = 1e-3  # of the distance of two values; a choice
-_SEARCHES = 30  # steps of the search for an extreme
-_GOLDEN = 0.3819660112501051
 
 
 class Change(NamedTuple):
@@ -61,8 +53,9 @@ def places(margin: Margin, values: Sequence[float]) -> list[float]:
     """
     if len(values) < 2:
         return list(values)
-    first = values[0] + _AT_ENDS * (values[1] - values[0])
-    last = values[-1] - _AT_ENDS * (values[-1] - values[-2])
+    beside = 1e-3  # of the distance of two values; a choice
+    first = values[0] + beside * (values[1] - values[0])
+    last = values[-1] - beside * (values[-1] - values[-2])
     return sorted({*values, *_extremes(margin, [values[0], first, *values[1:-1], last, values[-1]])})
 
 
@@ -144,7 +137,7 @@ def _locate(margin: Margin, low: float, high: float, lost: bool, width: float, b
         alone takes none nearby below -4.
         """
         signs = [sign for k, sign in enumerate(margin(value) or ()) if k in passing or not passing]
-        return any(-_HIDDEN * sign.error <= sign.value <= sign.error for sign in signs)
+        return any(-4.0 * sign.error <= sign.value <= sign.error for sign in signs)
 
     stride = math.copysign(max(high - low, EPSILON * abs(stable)), bound - stable)
     while hidden(stable) and stable != bound:
@@ -174,8 +167,8 @@ def left_open(
 
 
 def left_by_windows(values: Sequence[float]) -> float:
-    """By how much the mean of what the windows say is surely not off; 0 where there are none."""
-    return SURE * statistics.stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0.0
+    """By how much the mean of what the windows say is surely not off, three standard errors; 0 without windows."""
+    return 3.0 * statistics.stdev(values) / math.sqrt(len(values)) if len(values) > 1 else 0.0
 
 
 def _negative(signs: Sequence[Rounded] | None) -> list[int]:
@@ -196,13 +189,13 @@ def _narrowed(margin: Margin, low: float, high: float, lost: bool, width: float)
     if not least(low) * least(high) < 0.0:
         return low, high
     root = bracketed_root(least, low, high, absolute=width)
-    apart = max(width, _CLOSE * EPSILON * abs(root))
+    apart = max(width, 4.0 * EPSILON * abs(root))  # a few units of rounding
     while apart < high - low:
         below = max(low, root - apart)
         above = min(high, root + apart)
         if grows(margin(below)) is not lost and grows(margin(above)) is lost:
             return below, above
-        apart = _WIDER * apart
+        apart = 8.0 * apart
     return low, high
 
 
@@ -228,23 +221,24 @@ def _extreme(margin: Margin, which: int, sign: float, low: float, high: float) -
         signs = margin(value)
         return sign * signs[which].value if signs is not None else math.inf
 
-    a = low + _GOLDEN * (high - low)
-    b = high - _GOLDEN * (high - low)
+    golden = 0.3819660112501051
+    a = low + golden * (high - low)
+    b = high - golden * (high - low)
     at_a = height(a)
     at_b = height(b)
-    for _ in range(_SEARCHES):
+    for _ in range(30):
         if min(at_a, at_b) < 0.0:
             break
         if at_a < at_b:
             high = b
             b = a
             at_b = at_a
-            a = low + _GOLDEN * (high - low)
+            a = low + golden * (high - low)
             at_a = height(a)
         else:
             low = a
             a = b
             at_a = at_b
-            b = high - _GOLDEN * (high - low)
+            b = high - golden * (high - low)
             at_b = height(b)
     return a if at_a < at_b else b

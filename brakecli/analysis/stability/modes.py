@@ -18,8 +18,6 @@ from brakecli.solver.coefficients import Coefficients
 
 Complex = NDArray[np.complex128]
 Tensor = tuple[Any, Any, Any]
-_MOVES = 1e-12  # of y: an x below that is rounding
-_REAL = 1e-9  # of a root: an imaginary part below that is rounding, of which double roots have its square root
 
 
 @dataclass(frozen=True)
@@ -136,7 +134,7 @@ def modes_of(values: Complex, vectors: Complex) -> list[Mode]:
 
 def _mode(value: Any, vector: Complex) -> Mode:
     value += 0.0  # without -0
-    moves = abs(vector[0]) > _MOVES * abs(vector[1])
+    moves = abs(vector[0]) > 1e-12 * abs(vector[1])  # beyond rounding
     ratio = vector[1] / vector[0] if moves else 0.0
     return Mode(
         growth=float(value.real),
@@ -213,9 +211,9 @@ def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Cr
 
 
 def _positive_roots(coefficients: NDArray[np.float64]) -> list[float]:
-    """Real roots > 0 of a polynomial with rising powers."""
+    """Real roots > 0 of a polynomial with rising powers; an imaginary part below 1e-9 is rounding."""
     scale = np.abs(coefficients).max()
     if scale == 0.0:
         return []
     roots = np.polynomial.polynomial.polyroots(np.trim_zeros(coefficients / scale, "b"))
-    return [float(root.real) for root in roots if abs(root.imag) <= _REAL * abs(root) and root.real > 0.0]
+    return [float(root.real) for root in roots if abs(root.imag) <= 1e-9 * abs(root) and root.real > 0.0]

@@ -46,13 +46,8 @@ from brakecli.solver.steady_sliding import (
 from brakecli.solver.system import System
 
 LARGEST_FRICTION = 10.0  # to which rough surfaces are searched, whose stiffness depends on friction
-FRICTION_STEP = 0.025
 FRICTIONS = 41  # values among which a scheme is asked where it loses stability, by 0.25 where nothing is known
-_NEAR = 1e-3  # of friction, by which a stable value lies below the critical one that tells its error; a choice
 MARGIN = 1e-9  # growth per step that counts as growth: above the rounding of simple eigenvalues
-_CLEAR_MARGIN = 1e-6  # above that of double ones, where a direction has no spring
-_LOCATED = 1e-9  # bracket of the friction at which a scheme loses stability, as far as rounding moves that
-_STEP_HALVINGS = 60  # of the same for a step in time
 
 StiffnessAt = Callable[[float], float]
 
@@ -212,7 +207,7 @@ def _critical_error(system: System, critical: Crossing, windows: list[Mean]) -> 
 
     which = FLUTTER if critical.instability == "flutter" else DIVERGENCE
     change = Change(critical.friction, 0.0, True, which)
-    near = max(critical.friction - _NEAR, 0.0)
+    near = max(critical.friction - 1e-3, 0.0)  # a stable value; a choice
     summed = by(partial(mean_contact, finer(system)))
     return left_open(by(tabulated(system)), [by(mean) for mean in windows], summed, change, near)
 
@@ -226,7 +221,7 @@ def _rough_crossings(c: Coefficients, belt: float, stiffness_at: StiffnessAt, up
     if c.c_xx == 0.0:
         return []
     all_crossings = []
-    frictions = np.linspace(0.0, up_to, math.ceil(up_to / FRICTION_STEP) + 1).tolist()
+    frictions = np.linspace(0.0, up_to, math.ceil(up_to / 0.025) + 1).tolist()
     for change in margin_changes(_along_friction(c, belt, stiffness_at), frictions):
         phi = change.value
         if change.which == FLUTTER:
@@ -267,7 +262,8 @@ def discrete_critical(system: System, stiffness_at: StiffnessAt, exact: Crossing
         return 0.0
     highest = 2.0 * exact.friction if exact else LARGEST_FRICTION
     frictions = np.linspace(0.0, highest, FRICTIONS).tolist()
-    return next((change.value for change in between(signs_at, frictions, _LOCATED) if change.lost), None)
+    # rounding moves a change by as much as this bracket
+    return next((change.value for change in between(signs_at, frictions, 1e-9) if change.lost), None)
 
 
 def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
@@ -279,12 +275,13 @@ def step_limit(system: System, stiffness_at: StiffnessAt) -> float | None:
     omega = 2.0 * math.pi * natural_frequencies(system.coefficients, k)[1]
 
     def is_stable(h: float) -> bool:
-        # Entries of the matrix are rounded to ε (ωh)² over the difference, double eigenvalues to the root of that.
+        # Entries of the matrix are rounded to ε (ωh)² over the difference, double eigenvalues to the root of that:
+        # where a direction has no spring they are double, so that no less than 1e-6 counts as growth.
         rounding = math.sqrt(np.finfo(float).eps / DIFFERENCE) * omega * h
-        return spectral_radius(system, k, 0.0, h) <= 1.0 + max(_CLEAR_MARGIN, rounding)
+        return spectral_radius(system, k, 0.0, h) <= 1.0 + max(1e-6, rounding)
 
     ladder = (10.0 ** np.arange(-2.0, 4.1, 0.25) / omega).tolist()
     if not is_stable(ladder[0]):
         return 0.0
     bracket = next((pair for pair in pairwise(ladder) if not is_stable(pair[1])), None)
-    return bisect(is_stable, *bracket, halvings=_STEP_HALVINGS, geometric=True)[0] if bracket else None
+    return bisect(is_stable, *bracket, halvings=60, geometric=True)[0] if bracket else None
