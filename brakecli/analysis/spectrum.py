@@ -5,11 +5,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from brakecli.solver.arrays import Floats
 from brakecli.solver.history import History
 
-Array = NDArray[np.float64]
+Array = Floats
 
 LONGEST_SEGMENT = 1 << 16  # samples, so that the memory that a spectrum takes does not grow with the run
 SEGMENTS_AT_ONCE = 16

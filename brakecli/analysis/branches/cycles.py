@@ -7,9 +7,10 @@ sizes of the motion, so that a branch is straight where the cycle moves along wi
 """
 
 import math
+from collections.abc import Hashable
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -32,12 +33,23 @@ INSTANT = 1e-12
 """Part of the period that a flow takes at least: it has no step of no length."""
 
 
+class Way(NamedTuple):
+    """The way of a motion through a span (SI units)."""
+
+    start: Array  # the derivative by time at the begin,
+    velocity: Array  # and at the end
+    time: float
+    spent: Array  # in each phase
+    low: Array  # of x, y and v_x; v_x counts in slip alone
+    high: Array
+
+
 class Flow(Protocol):
     """What carries a state over a span; what it says is that of the last span. `SmoothFlow` says it in full."""
 
     @property
-    def path(self) -> Any:
-        """Its `start` and `velocity` (the begin and the end by time), `time`, `spent`, `low` and `high`."""
+    def path(self) -> Way:
+        """How it has come there."""
 
     @property
     def state(self) -> Array:
@@ -81,8 +93,10 @@ NAMES = {STICK: "stick", OPEN: "flight", FORWARD: "slip forwards", BACKWARD: "sl
 """Of phases; what stands first is what a change of their sequence is told by."""
 
 
-def changed_phases(before: tuple[int, ...], after: tuple[int, ...]) -> str:
+def changed_phases(before: Hashable, after: Hashable) -> str:
     """What begins or ends from one sequence of phases to another; empty where only their order changes."""
+    assert isinstance(before, tuple)
+    assert isinstance(after, tuple)
     for phase, name in NAMES.items():
         there = before.count(phase)
         more = after.count(phase) - there
@@ -327,14 +341,16 @@ class Cycles(Problem):
             return None
         return np.asarray((flow.state - state) / point.chart.scales)
 
-    def border(self, before: Any, after: Any) -> str:
+    def border(self, before: Hashable, after: Hashable) -> str:
         """What one of two sequences of phases has more of: stick, or flight."""
+        assert isinstance(before, tuple)
+        assert isinstance(after, tuple)
         changes = [(after.count(phase) - before.count(phase), phase) for phase in (STICK, OPEN)]
         if changes[1][0]:
             return "grazing flight"
         return "grazing stick" if changes[0][0] or before != after else "sequence of events changes"
 
-    def change(self, before: Any, after: Any) -> str:
+    def change(self, before: Hashable, after: Hashable) -> str:
         """What begins or ends from one sequence of phases to another."""
         return changed_phases(before, after)
 

@@ -8,10 +8,10 @@ as the sequence of phases is the same.
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import replace
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -211,11 +211,13 @@ class Forced(Doubled):
         first, second = np.split(point.u, 2)
         return np.asarray(second - first)
 
-    def border(self, before: Any, after: Any) -> str:
+    def border(self, before: Hashable, after: Hashable) -> str:
         """What one of two sequences of phases has more of. Lift-off is no border, as the force is continuous."""
+        assert isinstance(before, tuple)
+        assert isinstance(after, tuple)
         return "sequence of events changes" if before.count(STICK) == after.count(STICK) else "grazing stick"
 
-    def change(self, before: Any, after: Any) -> str:
+    def change(self, before: Hashable, after: Hashable) -> str:
         """What begins or ends from one sequence of phases to another."""
         return changed_phases(before, after)
 

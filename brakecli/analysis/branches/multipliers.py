@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -73,7 +73,7 @@ def spectrum(maps: Floats) -> Spectrum:
     return Spectrum(np.array(values, dtype=complex), tests, coefficients)
 
 
-def resonant_pair(multipliers: Any) -> tuple[complex, complex] | None:
+def resonant_pair(multipliers: Iterable[complex]) -> tuple[complex, complex] | None:
     """Return the two multipliers whose product is nearest to one; None where there is only one multiplier."""
     values = [complex(value) for value in multipliers]
     pairs = [(a, b) for i, a in enumerate(values) for b in values[i + 1 :]]

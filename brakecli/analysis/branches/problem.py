@@ -7,13 +7,12 @@ over the range that a user has given. Unknowns and gap are scaled by the problem
 from collections.abc import Hashable
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
+from brakecli.solver.arrays import Floats
 
 if TYPE_CHECKING:
     from brakecli.analysis.branches.point import Point
 
-Array = NDArray[np.float64]
+Array = Floats
 
 
 class Evaluation(NamedTuple):
@@ -29,7 +28,7 @@ class Evaluation(NamedTuple):
     """(k, d, d); the Floquet multipliers are those of the product `maps[-1] @ ... @ maps[0]`."""
     word: Hashable
     """The sequence of events. The gap is smooth where the word does not change."""
-    facts: Any
+    facts: object
     """What the problem wants to know of this motion later; the engine does not look at it."""
     margins: tuple[float, ...] = ()
     """Smooth values that fall to zero where the word changes, with one meaning for each place within a word.

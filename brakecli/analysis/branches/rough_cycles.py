@@ -6,11 +6,10 @@ continuous.
 """
 
 import math
-from typing import Any, NamedTuple
 
 import numpy as np
 
-from brakecli.analysis.branches.cycles import Chart, Cycles, Flow
+from brakecli.analysis.branches.cycles import Chart, Cycles, Flow, Way
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.problem import Array
 from brakecli.errors import CaseError, Problem
@@ -20,17 +19,6 @@ from brakecli.solver.phases import BACKWARD, OPEN, STICK
 from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
 _ENDS = {Status.DONE: DONE, Status.GRAZED: GRAZED, Status.TOO_MANY_EVENTS: EVENTFUL}
-
-
-class Way(NamedTuple):
-    """The way of a motion through a span, as that on smooth pads is described (SI units)."""
-
-    start: Array
-    velocity: Array
-    time: float
-    spent: Array
-    low: Array  # of x, y and v_x; v_x counts in slip alone
-    high: Array
 
 
 class Span:
@@ -58,8 +46,13 @@ class Span:
         self.state = run.state
         self.word = run.word
         self.times = run.times
-        self.derivative: Any = run.derivative  # None where it was not asked for
         return _ENDS.get(run.status, LONG)
+
+    @property
+    def derivative(self) -> Array:
+        """See `Flow`."""
+        assert self._run.derivative is not None
+        return self._run.derivative
 
     @property
     def path(self) -> Way:

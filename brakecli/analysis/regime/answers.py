@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 from brakecli.analysis.regime.decision import Thresholds, fill
 
@@ -111,7 +111,7 @@ class Answers(NamedTuple):
     harmonic_share: float = math.nan  # of one line and its multiples
     band_share: float = math.nan  # in three narrow bands, where the frequency does not wander
 
-    def known(self) -> dict[str, Any]:
+    def known(self) -> dict[str, str | float]:
         """What is known, by name: numbers, texts, and 1 for what holds."""
         stored = {name: value for name, value in self._asdict().items() if value != self._field_defaults[name]}
         return {
@@ -121,7 +121,7 @@ class Answers(NamedTuple):
         }
 
     @classmethod
-    def of(cls, stored: Mapping[str, Any]) -> "Answers":
+    def of(cls, stored: Mapping[str, object]) -> "Answers":
         """The record of what is known by name; what else there is does not matter."""
         defaults = cls._field_defaults.items()
         return cls(**{name: type(value)(stored[name]) for name, value in defaults if name in stored})

@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from enum import StrEnum
 from string import Formatter
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 
 class Regime(StrEnum):
@@ -71,21 +71,21 @@ class UnknownNumberError(Exception):
 class _Writer(Formatter):
     """Writes what is known, by the names of answers."""
 
-    def __init__(self, answers: Any) -> None:
+    def __init__(self, answers: object) -> None:
         self.answers = answers
 
-    def get_value(self, key: int | str, args: Any, kwargs: Any) -> Any:
+    def get_value(self, key: int | str, args: object, kwargs: object) -> object:
         """The answer of a name."""
         return getattr(self.answers, str(key))
 
-    def format_field(self, value: Any, format_spec: str) -> str:
+    def format_field(self, value: object, format_spec: str) -> str:
         """A value in a sentence; raises UnknownNumberError for a number that is not finite."""
         if isinstance(value, float) and not math.isfinite(value):
             raise UnknownNumberError
         return str(super().format_field(value, format_spec))
 
 
-def fill(text: str, answers: Any) -> str:
+def fill(text: str, answers: object) -> str:
     """A text with the numbers of answers; raises UnknownNumberError where one is not known.
 
     What stands in [brackets] is left out then.
@@ -96,7 +96,7 @@ def fill(text: str, answers: Any) -> str:
     return "".join(pieces)
 
 
-def _fill_or_nothing(text: str, answers: Any) -> str:
+def _fill_or_nothing(text: str, answers: object) -> str:
     """A text with the numbers of answers, or none where one is not known."""
     try:
         return fill(text, answers)
@@ -118,12 +118,12 @@ class Row(NamedTuple, Generic[A, T]):
     """
 
     name: str
-    holds: Callable[[A, T], Any]
+    holds: Callable[[A, T], object]
     sentence: str
     remedy: str = ""
     regime: Regime = Regime.UNDECIDED
     excitation: Excitation = Excitation.NONE
-    longer: bool | Callable[[A], Any] = False
+    longer: bool | Callable[[A], object] = False
 
     def decision(self, answers: A) -> Decision:
         """What it says of these answers; raises UnknownNumberError where they lack a number that it needs."""

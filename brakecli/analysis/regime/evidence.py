@@ -201,7 +201,7 @@ def _spectrum(values: Array, interval: float) -> tuple[Array, Array, float]:
     return frequencies, power, float(power.sum())
 
 
-def _near(lines: Sequence[float], frequencies: NDArray[Any], bins: int = LINE_BINS) -> NDArray[np.bool_]:
+def _near(lines: Sequence[float], frequencies: NDArray[np.floating], bins: int = LINE_BINS) -> NDArray[np.bool_]:
     """Which frequencies of a spectrum belong to lines (Hz)."""
     chosen = np.zeros(len(frequencies), dtype=bool)
     for line in lines if len(frequencies) > 1 else ():

@@ -3,10 +3,9 @@
 import math
 from collections.abc import Callable
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple, TypedDict
 
 import numpy as np
-from numpy.typing import NDArray
 
 from brakecli.analysis.fate import Fate, Kind
 from brakecli.analysis.regime.answers import Answers, Continuation
@@ -18,11 +17,33 @@ from brakecli.analysis.regime.spectra import MULTIPLES
 from brakecli.analysis.regime.statistics import Statistics
 from brakecli.analysis.regime.torus import turns_per_cycle
 from brakecli.analysis.stability.linear import Linear
+from brakecli.solver.arrays import Floats
 from brakecli.solver.history import History
 from brakecli.solver.phases import STICK
 from brakecli.solver.quantities import ContactState
 from brakecli.solver.tangent import Exponent
 from brakecli.solver.track import UNTRACKED, Events, Track
+
+
+class Powers(TypedDict):
+    """Answers about powers (W)."""
+
+    power_of_friction: float
+    power_of_roughness: float
+    power_stored: float
+    power_of_friction_error: float
+    power_of_roughness_error: float
+
+
+class WithoutWaves(TypedDict, total=False):
+    """Answers about what a motion comes to on the smooth wheel: none where that is not known."""
+
+    without_waves: Continuation
+    amplitude_without_waves: float
+    level_without_waves: float
+    rate_without_waves: float
+    period_without_waves: float
+    sticks_without_waves: float
 
 
 class Given(NamedTuple):
@@ -129,7 +150,7 @@ class Shown:
         return tuple([f for f, swing in self.context.waves if swing >= self.limits.settled_within * least])
 
     @cached_property
-    def _before(self) -> NDArray[np.float64]:
+    def _before(self) -> Floats:
         """Level of vx and amplitude of x in the third quarter, over those in the last one."""
         before = Stretch(self.history, self.half, 3 * self.samples // 4)
         sizes = np.array([before.deviation("vx"), before.amplitude("x")])
@@ -143,7 +164,7 @@ class Shown:
         """Rate (1/s) at which vx or x, whichever does more so, changes from the third quarter to the last."""
         return float(np.abs(np.log(np.maximum(self._before, 1e-300))).max()) / (0.25 * self.duration)
 
-    def powers(self) -> dict[str, float]:
+    def powers(self) -> Powers:
         """Powers (W) that friction and the roughness give, with their errors, by the loop's account.
 
         What dashpots and scheme leave of both is nothing where the motion has settled.
@@ -176,61 +197,60 @@ def answers(shown: Shown) -> Answers:
     context = shown.context
     statistics = shown.statistics
     exponent = shown.motion.exponent
-    failure = shown.motion.failure
     stands = context.belt_speed == 0.0
-    waves = bool(context.forced)
-    facts: dict[str, Any] = {
-        "failure": failure,
-        "duration": shown.duration,
-        "samples": shown.samples,
-        "few_samples": shown.samples < FEWEST_SAMPLES,
-        "constant_speed_and_load": context.steady,
-        "wheel_stands": stands,
-        "waves": waves,
-        "frictionless": context.frictionless,
-        "undamped": context.undamped,
-        "locking_friction": math.nan if context.locks is None else context.locks,
-        "held_by_link": context.held_by_link,
-        "never_touched": shown.stays(ContactState.SEPARATED, 0),
-        "contact_lost": shown.stays(ContactState.SEPARATED, shown.half),
-        "contact_left": shown.stays(ContactState.SEPARATED, shown.quarter),
-        "carried_along": shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
-    }
+    record = Answers(
+        failure=shown.motion.failure,
+        duration=shown.duration,
+        samples=shown.samples,
+        few_samples=shown.samples < FEWEST_SAMPLES,
+        constant_speed_and_load=context.steady,
+        wheel_stands=stands,
+        waves=bool(context.forced),
+        frictionless=context.frictionless,
+        undamped=context.undamped,
+        locking_friction=math.nan if context.locks is None else context.locks,
+        held_by_link=context.held_by_link,
+        never_touched=shown.stays(ContactState.SEPARATED, 0),
+        contact_lost=shown.stays(ContactState.SEPARATED, shown.half),
+        contact_left=shown.stays(ContactState.SEPARATED, shown.quarter),
+        carried_along=shown.stays(ContactState.STICK, shown.quarter if stands else shown.half),
+    )
     if exponent is not None:
-        facts |= {
-            "lyapunov_exponent": exponent.rate,
-            "lyapunov_by_line": exponent.even,
-            "lyapunov_by_line_error": exponent.even_error,
-        }
+        record = record._replace(
+            lyapunov_exponent=exponent.rate,
+            lyapunov_by_line=exponent.even,
+            lyapunov_by_line_error=exponent.even_error,
+        )
     if shown.brief:
-        return Answers(**facts)
-    facts |= {
-        "moves": statistics.largest_level > context.quiet,
-        "slowest_wave_period": shown.slowest(statistics.swing),
-        "level_change": statistics.change,
-        "level_change_error": statistics.change_error,
-        "amplitude": statistics.amplitude,
-        "level": statistics.level,
-        "settled": statistics.settled_from > 0,
-        "settled_duration": (shown.samples - shown.judged_from) * shown.interval,
-    }
+        return record
+    record = record._replace(
+        moves=statistics.largest_level > context.quiet,
+        slowest_wave_period=shown.slowest(statistics.swing),
+        level_change=statistics.change,
+        level_change_error=statistics.change_error,
+        amplitude=statistics.amplitude,
+        level=statistics.level,
+        settled=statistics.settled_from > 0,
+        settled_duration=(shown.samples - shown.judged_from) * shown.interval,
+    )
     if exponent is not None:
-        drift = 0.0 if facts["settled"] else shown.drift()
-        passing = 0.0 if _lasts(shown, Answers(**facts)) else max(exponent.rate, 0.0)  # what grows on the way only
-        facts["lyapunov_error"] = math.hypot(exponent.error, drift, passing)
-    if (theory := shown.linear) is not None:
-        facts |= {"linear": True, "ringing_frequency": theory.mode.frequency}
-        if math.isfinite(theory.known_to):  # otherwise only neighbours tell
-            facts |= {"growth_rate": theory.mode.growth, "growth_rate_error": theory.known_to}
-        if theory.direction > 0:
-            facts |= {"time_to_limit": theory.seconds_to_limit(*shown.end), "steadier": context.steadier()}
-    else:
-        facts |= _of_more(shown, waves)
-    return Answers(**facts)
+        drift = 0.0 if record.settled else shown.drift()
+        passing = 0.0 if _lasts(shown, record) else max(exponent.rate, 0.0)  # what grows on the way only
+        record = record._replace(lyapunov_error=math.hypot(exponent.error, drift, passing))
+    theory = shown.linear
+    if theory is None:
+        return _with_more(record, shown)
+    record = record._replace(linear=True, ringing_frequency=theory.mode.frequency)
+    if math.isfinite(theory.known_to):  # otherwise only neighbours tell
+        record = record._replace(growth_rate=theory.mode.growth, growth_rate_error=theory.known_to)
+    if theory.direction > 0:
+        limit = theory.seconds_to_limit(*shown.end)
+        record = record._replace(time_to_limit=limit, steadier=context.steadier())
+    return record
 
 
-def of_fate(fate: Fate) -> dict[str, Any]:
-    """The answers about what a motion comes to on the smooth wheel, by their names."""
+def of_fate(fate: Fate) -> WithoutWaves:
+    """The answers about what a motion comes to on the smooth wheel."""
     if fate.lasts is None:
         return {}
     if (orbit := fate.orbit) is None:
@@ -239,7 +259,7 @@ def of_fate(fate: Fate) -> dict[str, Any]:
         "without_waves": Continuation.LASTS,
         "amplitude_without_waves": orbit.amplitude,
         "level_without_waves": orbit.level,
-        "rate_without_waves": fate.rate,
+        "rate_without_waves": math.nan if fate.rate is None else fate.rate,
         "period_without_waves": orbit.period,
         "sticks_without_waves": float(orbit.word.count(STICK)) if orbit.word else math.nan,
     }
@@ -252,23 +272,28 @@ def _lasts(shown: Shown, record: Answers) -> bool:
     return fades or abs(record.level_change) <= shown.limits.sure_errors * record.level_change_error
 
 
-def _of_more(shown: Shown, waves: bool) -> dict[str, Any]:
-    """What has to be known of a motion that is not linear."""
+def _with_more(record: Answers, shown: Shown) -> Answers:
+    """The record with what has to be known of a motion that is not linear."""
     context = shown.context
-    facts = dict[str, Any](growth_rate=shown.context.growth())
+    record = record._replace(growth_rate=context.growth())
     if not context.frictionless:
-        facts |= of_fate(shown.fate)
-    if waves:
-        facts |= shown.powers() | {"touches_in_sliding": context.touches()}
+        record = record._replace(**of_fate(shown.fate))
+    if record.waves:
+        record = record._replace(**shown.powers(), touches_in_sliding=context.touches())
     if cycles := shown.cycles:
-        names = ("cycles", "samples_per_cycle", "stick_cycles", "harmonic_share")
-        facts |= {name: cycles.evidence[name] for name in names} | {"frequency": cycles.frequency}
+        record = record._replace(
+            cycles=cycles.evidence["cycles"],
+            samples_per_cycle=cycles.evidence["samples_per_cycle"],
+            stick_cycles=cycles.evidence["stick_cycles"],
+            harmonic_share=cycles.evidence["harmonic_share"],
+            frequency=cycles.frequency,
+        )
         if cycles.evidence["frequency_spread"] <= shown.limits.settled_within * cycles.frequency:
-            facts["band_share"] = shown.judged.narrow()
-        if not waves and facts.get("without_waves") == Continuation.LASTS and shown.fate.orbit is None:
+            record = record._replace(band_share=shown.judged.narrow())
+        if not record.waves and record.without_waves is Continuation.LASTS and shown.fate.orbit is None:
             late = cycles.sizes[len(cycles.sizes) // 2 :]  # the level may settle before what modulates it
             turns = turns_per_cycle(late, shown.limits.settled_within)
-            facts["frequency_of_modulation"] = turns * cycles.frequency
+            record = record._replace(frequency_of_modulation=turns * cycles.frequency)
         if context.step:
-            facts["steps_per_cycle"] = 1.0 / (cycles.frequency * context.step)
-    return facts
+            record = record._replace(steps_per_cycle=1.0 / (cycles.frequency * context.step))
+    return record

@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from functools import lru_cache
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,7 @@ def statistics(histories: Sequence[History], within: float) -> list[Statistics]:
     return at_once([(history.interval, history.samples) for history in histories], of_those)
 
 
-def _columns(history: History, within: float) -> dict[str, NDArray[Any]]:
+def _columns(history: History, within: float) -> dict[str, NDArray[np.generic]]:
     """The numbers of `Statistics` by their names, of each of many histories."""
     samples = history.samples
     first, last = tenths(samples)

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 from scipy.ndimage import median_filter, uniform_filter1d
@@ -180,11 +179,12 @@ def _longest_piece(values: Array, longest_gap: float, notes: list[str]) -> tuple
     return values[begin:end], int(begin)
 
 
-def _far(values: Array, away: Array) -> Any:
+def _far(values: Array, away: Array) -> Array:
     """By what a spike leaves the median of its neighbours, which others leave by `away`; along the last axis."""
     low, high = np.quantile(values, [_OUTER, 1.0 - _OUTER], axis=-1)
     deviation = DEVIATION * np.median(np.abs(away), axis=-1)
-    return np.maximum(_SPIKE_DEVIATIONS * deviation, 0.35 * (high - low))
+    far: Array = np.maximum(_SPIKE_DEVIATIONS * deviation, 0.35 * (high - low))
+    return far
 
 
 def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array:
@@ -197,8 +197,7 @@ def _without_spikes(values: Array, is_velocity: bool, notes: list[str]) -> Array
     beside = np.abs(np.stack([np.roll(values, 1), np.roll(values, -1)]) - (values - away)).max(axis=0)
     spikes &= np.abs(away) > 3.0 * beside
     places = np.flatnonzero(spikes)
-    before, behind = (np.arange(-24, 0), np.arange(1, 25))
-    for side in (before, behind):  # the louder of which a spike has to leave; a choice
+    for side in (np.arange(-24, 0), np.arange(1, 25)):  # the louder of which a spike has to leave; a choice
         there = np.clip(places[:, None] + side, 0, len(values) - 1)
         # a tenth of normal numbers leave their middle by more than 1.645 deviations
         beyond = _SPIKE_DEVIATIONS * np.quantile(np.abs(away[there]), 1.0 - _OUTER, axis=-1) / 1.645

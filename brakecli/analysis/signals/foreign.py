@@ -12,7 +12,6 @@ from collections.abc import Callable
 from functools import partial
 from io import FileIO
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numpy as np
@@ -108,7 +107,7 @@ def _datasets(file: h5py.File) -> list[str]:
     return sorted(name for node, name in names.items() if isinstance(node, h5py.Dataset))
 
 
-def _member(group: h5py.Group, name: str) -> Any:
+def _member(group: h5py.Group, name: str) -> h5py.Group | h5py.Dataset | None:
     """What a group holds under a path; None where there is nothing, or only a link or a view of something else.
 
     Links to other files may lead to a pipe. HDF5 opens what a view shows as soon as its shape is asked for, and

@@ -3,7 +3,7 @@
 import math
 from functools import cached_property
 from itertools import product
-from typing import Any
+from typing import TypedDict
 
 import numpy as np
 
@@ -16,6 +16,34 @@ from brakecli.analysis.spectrum import Array, interpolated
 
 _PLATEAU_SAMPLES = 1 << 20  # most samples in which a plateau is sought
 _WINDOW_CYCLES = 3.0  # fewer cycles in a window do not have a level
+
+
+class Lasts(TypedDict):
+    """Answers about whether it lasts."""
+
+    died_to: float
+    hidden: float
+    was_loud: bool
+    steady_from: float
+    level_change: float
+    level_change_error: float
+
+
+class Harmony(TypedDict):
+    """Answers about where the energy lies."""
+
+    overtones: float
+    beyond_lines: float
+    noise_share: float
+    line_share: float
+
+
+class Stay(TypedDict):
+    """Answers about how long the velocity stays where it is."""
+
+    plateau: float
+    sticks: float
+    reaches: bool
 
 
 class Heard:
@@ -89,7 +117,7 @@ class Heard:
         peak = near + int(np.argmax(self.lines[near : near + 3]))
         return interpolated(np.arange(len(self.lines)) / len(self.clean), self.lines, peak)
 
-    def level(self) -> dict[str, Any]:
+    def lasts(self) -> Lasts:
         """Whether it lasts."""
         velocity = self.velocity
         windows = max(self.windows, 10)  # the error of a level takes ten batches
@@ -105,10 +133,16 @@ class Heard:
             if steady(change, error, self.limits):
                 break
         was_loud = bool(levels[: windows // 2].max() >= largest)
-        fading = {"died_to": died_to, "hidden": hidden, "was_loud": was_loud}
-        return {**fading, "steady_from": steady_from, "level_change": change, "level_change_error": error}
+        return {
+            "died_to": died_to,
+            "hidden": hidden,
+            "was_loud": was_loud,
+            "steady_from": steady_from,
+            "level_change": change,
+            "level_change_error": error,
+        }
 
-    def harmony(self) -> dict[str, float]:
+    def harmony(self) -> Harmony:
         """Parts of the energy that tell lines in step from stick."""
         total = max(float(self.power.sum()), 1e-300)
         overtones = np.arange(3, 9)  # which two lines in step lack
@@ -123,7 +157,7 @@ class Heard:
             "line_share": line_share(self.power),
         }
 
-    def stay(self) -> dict[str, Any]:
+    def stay(self) -> Stay:
         """How long the velocity stays at that of the belt, or at an extreme one.
 
         A plateau is sought among 1000 samples of a cycle, interpolated, by three half widths over the amplitude.
@@ -160,11 +194,23 @@ class Heard:
 def answers(heard: Heard, *, has_belt: bool) -> SignalAnswers:
     """The record of answers."""
     slips = heard.slips
-    facts: dict[str, Any] = {"samples": float(heard.samples)}
-    if heard.heard:
-        facts |= {"smoothed_over": float(heard.smoothing), "cycles": heard.cycles}
-        facts |= {"samples_per_cycle": heard.samples / heard.cycles, "skewness": slips.skewness}
-        facts |= {"events": float(slips.count), "slips": slips.stick_slip}
-        facts |= {"slip_lasts": slips.lasts, "slip_swings": slips.swings, "knows_belt": math.isfinite(heard.belt)}
-        facts |= heard.level() | heard.harmony() | heard.stay()
-    return SignalAnswers(**facts, heard=heard.heard, has_belt=has_belt)
+    samples = float(heard.samples)
+    if not heard.heard:
+        return SignalAnswers(samples=samples, has_belt=has_belt)
+    return SignalAnswers(
+        samples=samples,
+        heard=True,
+        has_belt=has_belt,
+        knows_belt=math.isfinite(heard.belt),
+        smoothed_over=float(heard.smoothing),
+        cycles=heard.cycles,
+        samples_per_cycle=samples / heard.cycles,
+        skewness=slips.skewness,
+        events=float(slips.count),
+        slips=slips.stick_slip,
+        slip_lasts=slips.lasts,
+        slip_swings=slips.swings,
+        **heard.lasts(),
+        **heard.harmony(),
+        **heard.stay(),
+    )

@@ -1,13 +1,13 @@
 """Which numbers of a case move its critical friction coefficient, and how far each must change to be safe."""
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from functools import cache
 from itertools import pairwise, takewhile
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,7 +121,7 @@ def answer(case: Case, up_to: float = LARGEST_FRICTION) -> Answer | None:
 def numbers(case: Case) -> dict[Path, Number]:
     """Every number of a case, and every list of numbers, by key path; whole ones are choices, not quantities."""
 
-    def within(table: Any, path: Path) -> Iterator[tuple[Path, Number]]:
+    def within(table: Mapping[str, object], path: Path) -> Iterator[tuple[Path, Number]]:
         for key, value in table.items():
             if isinstance(value, dict):
                 yield from within(value, (*path, key))

@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, cast
+from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.method import MOST_EVALUATIONS, Method
@@ -58,7 +58,7 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
 
 
 @lru_cache(maxsize=16)  # a sweep over friction asks for the same two at every point
-def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: float) -> NDArray[np.float64]:
+def amplification(c: Coefficients, s: Weights, scheme: SteppingModule, contact_stiffness: float) -> Floats:
     """Amplification matrix of a scheme on the case's grid for steady sliding in full, smooth contact, U > 0.
 
     It acts on the scheme's memory of the motion, with velocities times h. The step is taken from a deep, loaded
@@ -69,7 +69,7 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
     loaded = c._replace(sin_beta=c.c_xy / contact_stiffness + c.phi, cos_beta=1.0 + c.c_yy / contact_stiffness)
     scales = [1.0 / s.h if name in scheme.VELOCITIES else 1.0 for name in scheme.MEMORY]
 
-    def step(moved: str | None = None, by: float = 0.0) -> NDArray[np.float64]:
+    def step(moved: str | None = None, by: float = 0.0) -> Floats:
         state = new(scheme.STATE)
         problem = new(PROBLEM)
         state.y = state.y_old = -1.0
@@ -83,7 +83,7 @@ def amplification(c: Coefficients, s: Weights, scheme: Any, contact_stiffness: f
         return np.array([state[name] for name in scheme.MEMORY]) / scales
 
     neighbours = [step(name, DIFFERENCE * scale) for name, scale in zip(scheme.MEMORY, scales, strict=True)]
-    matrix: NDArray[np.float64] = (np.array(neighbours) - step()).T / DIFFERENCE
+    matrix: Floats = (np.array(neighbours) - step()).T / DIFFERENCE
     matrix.flags.writeable = False
     return matrix
 
@@ -99,7 +99,7 @@ def spectral_radius(system: System, contact_stiffness: float, phi: float, step: 
     s = system.weights if step is None else system.weights._replace(h=step)
     if system.belt_speed < 0.0:  # the same shoe seen from behind: x and U change sign, and so do the couplings
         c = c._replace(b_xy=-c.b_xy, c_xy=-c.c_xy, sin_beta=-c.sin_beta)
-    scheme = module_of(system.method.scheme)
+    scheme = cast(SteppingModule, module_of(system.method.scheme))
     return float(np.abs(np.linalg.eigvals(amplification(c, s, scheme, contact_stiffness))).max())
 
 

@@ -89,7 +89,7 @@ def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: flo
     return [size * root for root in roots]
 
 
-def _real_roots(condition: Any) -> list[float]:
+def _real_roots(condition: Polynomial | float) -> list[float]:
     """Real roots of a polynomial, or of a number.
 
     Where products of rank one cancel, rounding leaves coefficients of too high a power. They add roots far away

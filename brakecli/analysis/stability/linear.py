@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, lru_cache
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -142,8 +142,8 @@ def _extremes(theory: Linear, waves: Complex, span: float) -> tuple[Array, Array
     begins, turns, inside, near = _blocks(tuple(theory.passing.tolist()), span)
     begins = waves[:, :, None] * begins
     rows = np.concatenate([begins.imag, begins.real], axis=1).swapaxes(1, 2).astype(np.float32, order="C")
-    peaks = list[Any]()
-    sizes = list[Any]()
+    peaks = list[tuple[NDArray[np.intp], NDArray[np.intp]]]()
+    sizes = list[list[Array]]()
     block = np.arange(rows.shape[1])
     for row in rows:  # one at a time, which stays in the cache
         x = (row.reshape(-1, _FEW, row.shape[1]) @ inside).reshape(len(row), -1)
@@ -225,7 +225,10 @@ def _by_waves(systems: Sequence[System], belts: Sequence[float]) -> list[Linear 
         )
 
 
-def _solved(s: Any, f: Array) -> Any:
+_Matrices = TypeVar("_Matrices", Array, Complex)
+
+
+def _solved(s: _Matrices, f: Array) -> _Matrices:
     """S⁻¹ f by Cramer's rule, for matrices of two rows; not finite where there is none."""
     determinant = s[..., 0, 0] * s[..., 1, 1] - s[..., 0, 1] * s[..., 1, 0]
     first = s[..., 1, 1] * f[..., 0] - s[..., 0, 1] * f[..., 1]

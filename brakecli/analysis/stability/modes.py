@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 
 Complex = NDArray[np.complex128]
@@ -41,24 +42,24 @@ class Crossing:
     lost: bool  # or regained
 
 
-def stiffness_matrix(c: Coefficients, contact_stiffness: Any, grip: Any) -> NDArray[np.float64]:
+def stiffness_matrix(c: Coefficients, contact_stiffness: float | Floats, grip: float | Floats) -> Floats:
     """S, N/m, with the contact stiffness K (N/m) and grip = sign(U) φ, for one system or a matrix for each."""
     return _matrix(c.c_xx, c.c_xy + grip * contact_stiffness, c.c_xy, c.c_yy + contact_stiffness)
 
 
-def damping_matrix(c: Coefficients) -> NDArray[np.float64]:
+def damping_matrix(c: Coefficients) -> Floats:
     """B, N s/m."""
     return _matrix(c.b_xx, c.b_xy, c.b_xy, c.b_yy)
 
 
-def _matrix(*entries: Any) -> NDArray[np.float64]:
+def _matrix(*entries: float | Floats) -> Floats:
     """A matrix of two rows of its four entries, or one for each of their values."""
     matrix = np.empty((*np.shape(entries[1]), 2, 2))
     matrix[..., 0, 0], matrix[..., 0, 1], matrix[..., 1, 0], matrix[..., 1, 1] = entries
     return matrix
 
 
-def first_order(c: Coefficients, s: NDArray[np.float64]) -> NDArray[np.float64]:
+def first_order(c: Coefficients, s: Floats) -> Floats:
     """A of ż = A z for x, y, vx, vy, from S/m."""
     a = np.zeros((*s.shape[:-2], 4, 4))
     a[..., 0, 2] = a[..., 1, 3] = 1.0
@@ -112,7 +113,7 @@ def eigensystem(c: Coefficients, contact_stiffness: float, grip: float) -> tuple
     return values.astype(complex), vectors[:2].astype(complex)
 
 
-def _null_vector(s: NDArray[np.float64], square: complex) -> Complex:
+def _null_vector(s: Floats, square: complex) -> Complex:
     """The vector with (S/m - square) v = 0, from the larger row."""
     rows = s - square * np.eye(2)
     row = rows[np.argmax(np.abs(rows).sum(axis=1))]
@@ -132,7 +133,7 @@ def modes_of(values: Complex, vectors: Complex) -> list[Mode]:
     return sorted(unsorted, key=lambda mode: -mode.growth)
 
 
-def _mode(value: Any, vector: Complex) -> Mode:
+def _mode(value: np.complex128, vector: Complex) -> Mode:
     value += 0.0  # without -0
     moves = abs(vector[0]) > 1e-12 * abs(vector[1])  # beyond rounding
     ratio = vector[1] / vector[0] if moves else 0.0
@@ -210,7 +211,7 @@ def crossings(c: Coefficients, contact_stiffness: float, belt: float) -> list[Cr
     ]
 
 
-def _positive_roots(coefficients: NDArray[np.float64]) -> list[float]:
+def _positive_roots(coefficients: Floats) -> list[float]:
     """Real roots > 0 of a polynomial with rising powers; an imaginary part below 1e-9 is rounding."""
     scale = np.abs(coefficients).max()
     if scale == 0.0:
