@@ -28,6 +28,64 @@ NOTICED = 0.2
 fades a twentieth as fast is seen to fade."""
 
 
+def lasts_on_rough_pads(
+    system: System, state: Floats, calm: Sequence[Floats], within: float = math.inf
+) -> tuple[bool | None, Floats, int]:
+    """Whether the motion from a state at t = 0 lasts, at constant speed and load; its last state, and its steps.
+
+    `calm`: states at t = 0 of the stable motions that are no vibrations: of steady sliding on a smooth wheel, else
+    of what the waves force. The motion fades once it follows the linear equations of one of them. It lasts once
+    it has kept its distance from all of them in a time twice as long. None without any of them, and where neither
+    is seen within some time (s).
+    """
+    span = _Span(system)
+    motions = list[_Calm]()
+    for begin in calm:
+        flown = span(np.array(begin, float), True)
+        if flown is None:
+            return None, state, span.taken
+        try:
+            motions.append(_Calm(span, *flown))
+        except np.linalg.LinAlgError:  # disturbances that are alike
+            return None, state, span.taken
+    last = np.array(state, float)
+    far = list[float]()
+    drawn = 0
+    # within a quarter of the time the dashpots shrink a disturbance of a vibration by a factor of e
+    spans = [1.0 / (slowest_of_cycles(system.coefficients) * span.length)]
+    spans += [NOTICED / -math.log(motion.radius) for motion in motions if 0.0 < motion.radius < 1.0]
+    while motions and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < within:
+        flown = span(last, False)
+        if flown is None:
+            break
+        drawn = drawn + 1 if any(motion.attracts(flown[0]) for motion in motions) else 0
+        if drawn == IN_A_ROW:
+            return False, flown[0][-1], span.taken
+        last = flown[0][-1]
+        far.append(min(motion.distance(flown[0]) for motion in motions))
+        quarter, remainder = divmod(len(far), 4)
+        whole = remainder == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
+        keeps = whole and max(far[2 * quarter :]) >= 0.99 * max(far[quarter : 2 * quarter])
+        if keeps and quarter >= max(spans) and not _falls(far[quarter:]):
+            return True, last, span.taken
+    return None, last, span.taken
+
+
+def _falls(far: list[float]) -> bool:
+    """Whether distances fall from span to span, by a line through the logarithms of the means of eighths.
+
+    Beside a value at which a vibration vanishes a motion keeps nearly all of its distance for long, but it falls
+    steadily.
+    """
+    means = [math.log(float(np.mean(eighth))) for eighth in np.array_split(far, min(len(far), 8))]
+    places = np.arange(len(means)) - 0.5 * (len(means) - 1)
+    slope = float(places @ means / (places @ places))
+    square = float(places @ places)
+    residual = np.array(means) - np.mean(means) - slope * places
+    error = math.sqrt(float(residual @ residual) / (len(means) - 2) / square)
+    return slope < -max(4.0 * error, 1e-6 / len(means))  # standard errors, and a fall that is none
+
+
 class _Span:
     """The flow of rough pads over whole common periods, which begins at t = 0 of the waves.
 
@@ -94,61 +152,3 @@ class _Calm:
         """The largest distance of a motion within the span, as the root of twice the energy that it takes."""
         apart = states - self.states
         return math.sqrt(float(np.einsum("ni,ij,nj->n", apart, self.span.weights, apart).max()))
-
-
-def lasts_on_rough_pads(
-    system: System, state: Floats, calm: Sequence[Floats], within: float = math.inf
-) -> tuple[bool | None, Floats, int]:
-    """Whether the motion from a state at t = 0 lasts, at constant speed and load; its last state, and its steps.
-
-    `calm`: states at t = 0 of the stable motions that are no vibrations: of steady sliding on a smooth wheel, else
-    of what the waves force. The motion fades once it follows the linear equations of one of them. It lasts once
-    it has kept its distance from all of them in a time twice as long. None without any of them, and where neither
-    is seen within some time (s).
-    """
-    span = _Span(system)
-    motions = list[_Calm]()
-    for begin in calm:
-        flown = span(np.array(begin, float), True)
-        if flown is None:
-            return None, state, span.taken
-        try:
-            motions.append(_Calm(span, *flown))
-        except np.linalg.LinAlgError:  # disturbances that are alike
-            return None, state, span.taken
-    last = np.array(state, float)
-    far = list[float]()
-    drawn = 0
-    # within a quarter of the time the dashpots shrink a disturbance of a vibration by a factor of e
-    spans = [1.0 / (slowest_of_cycles(system.coefficients) * span.length)]
-    spans += [NOTICED / -math.log(motion.radius) for motion in motions if 0.0 < motion.radius < 1.0]
-    while motions and span.taken < MOST_ROUGH_STEPS and len(far) * span.length < within:
-        flown = span(last, False)
-        if flown is None:
-            break
-        drawn = drawn + 1 if any(motion.attracts(flown[0]) for motion in motions) else 0
-        if drawn == IN_A_ROW:
-            return False, flown[0][-1], span.taken
-        last = flown[0][-1]
-        far.append(min(motion.distance(flown[0]) for motion in motions))
-        quarter, remainder = divmod(len(far), 4)
-        whole = remainder == 0 and quarter & (quarter - 1) == 0  # 4, 8, 16 … spans
-        keeps = whole and max(far[2 * quarter :]) >= 0.99 * max(far[quarter : 2 * quarter])
-        if keeps and quarter >= max(spans) and not _falls(far[quarter:]):
-            return True, last, span.taken
-    return None, last, span.taken
-
-
-def _falls(far: list[float]) -> bool:
-    """Whether distances fall from span to span, by a line through the logarithms of the means of eighths.
-
-    Beside a value at which a vibration vanishes a motion keeps nearly all of its distance for long, but it falls
-    steadily.
-    """
-    means = [math.log(float(np.mean(eighth))) for eighth in np.array_split(far, min(len(far), 8))]
-    places = np.arange(len(means)) - 0.5 * (len(means) - 1)
-    slope = float(places @ means / (places @ places))
-    square = float(places @ places)
-    residual = np.array(means) - np.mean(means) - slope * places
-    error = math.sqrt(float(residual @ residual) / (len(means) - 2) / square)
-    return slope < -max(4.0 * error, 1e-6 / len(means))  # standard errors, and a fall that is none

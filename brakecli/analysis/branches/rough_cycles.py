@@ -18,6 +18,48 @@ from brakecli.solver.motion.rough import RoughFlow, Status, default_cells, defau
 from brakecli.solver.phases import BACKWARD, OPEN, STICK
 from brakecli.solver.steady_sliding import steady_sliding, tabulated
 
+
+class RoughCycles(Cycles):
+    """Limit cycles along a line of cases whose shoe is rough and whose wheel is smooth."""
+
+    def __init__(self, line: Line, periods: int = 1, per_period: float = 80.0) -> None:
+        """`periods`: of the motions from which these have been doubled; `per_period`: steps to the fastest period.
+
+        A period is short, and the pad lifts off and lands in few steps: so they are many.
+
+        Raises CaseError where no place is valid, where the wheel is rough, and where speed or load change.
+        """
+        super().__init__(line, periods)
+        systems = line.systems(9).values()
+        if any(system.wheel.g.size for system in systems):
+            wrong = "the wheel is rough, so no motion repeats but those that its waves force"
+            raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
+        self.per_period = per_period
+        self.cells = max(map(default_cells, systems))
+
+    def _flow(self, p: float) -> Flow:
+        return Span(RoughFlow(self.line.system(p), self.cells), self.per_period)
+
+    def _equilibrium(self, p: float) -> Array:
+        system = self.line.system(p)
+        steady = steady_sliding(system, mean=tabulated(system))
+        return np.array([steady.x, steady.y, 0.0, 0.0])
+
+    def _over_period(self, flow: Flow, state: Array, periods: float, chart: Chart, derivative: bool) -> int:
+        assert isinstance(flow, Span)
+        return flow.over(state, periods * chart.time, flow.steps(chart.time), derivative)
+
+    def _fits(self, periods: float) -> bool:
+        return 0.6 < periods < 1.6  # the steps of a chart's period are too many below, and too few above
+
+    def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
+        if len(word) > 1 or word[0] == STICK:
+            return ()
+        belt = self.line.shoe(p).belt
+        fastest = high[2] if word[0] == BACKWARD else low[2]
+        return (abs(1.0 - float(fastest) / belt),) if math.isfinite(fastest) else ()
+
+
 _ENDS = {Status.DONE: DONE, Status.GRAZED: GRAZED, Status.TOO_MANY_EVENTS: EVENTFUL}
 
 
@@ -67,44 +109,3 @@ class Span:
         low = np.array([run.x[0], run.y[0], belt + least])
         high = np.array([run.x[1], run.y[1], belt - least])
         return Way(start, run.velocity, self._time, spent, low, high)
-
-
-class RoughCycles(Cycles):
-    """Limit cycles along a line of cases whose shoe is rough and whose wheel is smooth."""
-
-    def __init__(self, line: Line, periods: int = 1, per_period: float = 80.0) -> None:
-        """`periods`: of the motions from which these have been doubled; `per_period`: steps to the fastest period.
-
-        A period is short, and the pad lifts off and lands in few steps: so they are many.
-
-        Raises CaseError where no place is valid, where the wheel is rough, and where speed or load change.
-        """
-        super().__init__(line, periods)
-        systems = line.systems(9).values()
-        if any(system.wheel.g.size for system in systems):
-            wrong = "the wheel is rough, so no motion repeats but those that its waves force"
-            raise CaseError([Problem(("roughness", "wheel"), wrong, "make it smooth", source=line.label)])
-        self.per_period = per_period
-        self.cells = max(map(default_cells, systems))
-
-    def _flow(self, p: float) -> Flow:
-        return Span(RoughFlow(self.line.system(p), self.cells), self.per_period)
-
-    def _equilibrium(self, p: float) -> Array:
-        system = self.line.system(p)
-        steady = steady_sliding(system, mean=tabulated(system))
-        return np.array([steady.x, steady.y, 0.0, 0.0])
-
-    def _over_period(self, flow: Flow, state: Array, periods: float, chart: Chart, derivative: bool) -> int:
-        assert isinstance(flow, Span)
-        return flow.over(state, periods * chart.time, flow.steps(chart.time), derivative)
-
-    def _fits(self, periods: float) -> bool:
-        return 0.6 < periods < 1.6  # the steps of a chart's period are too many below, and too few above
-
-    def _margins(self, p: float, word: tuple[int, ...], low: Array, high: Array) -> tuple[float, ...]:
-        if len(word) > 1 or word[0] == STICK:
-            return ()
-        belt = self.line.shoe(p).belt
-        fastest = high[2] if word[0] == BACKWARD else low[2]
-        return (abs(1.0 - float(fastest) / belt),) if math.isfinite(fastest) else ()

@@ -61,6 +61,44 @@ class Decision(NamedTuple):
         return f"{self.reason}; {self.advice}" if self.advice else self.reason
 
 
+A = TypeVar("A")  # the answers
+T = TypeVar("T")  # and the thresholds of a table
+
+
+class Row(NamedTuple, Generic[A, T]):
+    """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers.
+
+    A row whose sentence needs a number that is not known does not hold, so that of the last one needs none. What
+    stands in [brackets] is said only where its numbers are known; so is what to do.
+
+    `longer` says whether a longer run may decide where the row does not.
+    """
+
+    name: str
+    holds: Callable[[A, T], object]
+    sentence: str
+    remedy: str = ""
+    regime: Regime = Regime.UNDECIDED
+    excitation: Excitation = Excitation.NONE
+    longer: bool | Callable[[A], object] = False
+
+    def decision(self, answers: A) -> Decision:
+        """What it says of these answers; raises UnknownNumberError where they lack a number that it needs."""
+        reason = fill(self.sentence, answers)
+        advice = _fill_or_nothing(self.remedy, answers)
+        longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
+        return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
+
+
+def first(rows: tuple[Row[A, T], ...], answers: A, thresholds: T) -> Decision:
+    """What the first row of a table says whose condition holds, and whose numbers are known."""
+    for row in rows:
+        if row.holds(answers, thresholds):
+            with suppress(UnknownNumberError):
+                return row.decision(answers)
+    raise AssertionError(f"no row holds; the last one, {rows[-1].name!r}, has to hold always")
+
+
 _OPTIONAL = re.compile(r"\[(.*?)\]")
 
 
@@ -102,41 +140,3 @@ def _fill_or_nothing(text: str, answers: object) -> str:
         return fill(text, answers)
     except UnknownNumberError:
         return ""
-
-
-A = TypeVar("A")  # the answers
-T = TypeVar("T")  # and the thresholds of a table
-
-
-class Row(NamedTuple, Generic[A, T]):
-    """A row: its name, its condition, what it says, and what to do. `{…}` are attributes of the answers.
-
-    A row whose sentence needs a number that is not known does not hold, so that of the last one needs none. What
-    stands in [brackets] is said only where its numbers are known; so is what to do.
-
-    `longer` says whether a longer run may decide where the row does not.
-    """
-
-    name: str
-    holds: Callable[[A, T], object]
-    sentence: str
-    remedy: str = ""
-    regime: Regime = Regime.UNDECIDED
-    excitation: Excitation = Excitation.NONE
-    longer: bool | Callable[[A], object] = False
-
-    def decision(self, answers: A) -> Decision:
-        """What it says of these answers; raises UnknownNumberError where they lack a number that it needs."""
-        reason = fill(self.sentence, answers)
-        advice = _fill_or_nothing(self.remedy, answers)
-        longer = bool(self.longer(answers) if callable(self.longer) else self.longer)
-        return Decision(reason, self.regime, self.excitation, advice=advice, row=self.name, longer=longer)
-
-
-def first(rows: tuple[Row[A, T], ...], answers: A, thresholds: T) -> Decision:
-    """What the first row of a table says whose condition holds, and whose numbers are known."""
-    for row in rows:
-        if row.holds(answers, thresholds):
-            with suppress(UnknownNumberError):
-                return row.decision(answers)
-    raise AssertionError(f"no row holds; the last one, {rows[-1].name!r}, has to hold always")

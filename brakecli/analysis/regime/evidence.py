@@ -63,9 +63,9 @@ class Stretch:
         number = int(state)  # which NumPy compares in half the time
         return sum(np.count_nonzero(piece == number) for piece in self.pieces("state")) / (self.stop - self.start)
 
-    def since(self, name: str, holds: Callable[[Array], NDArray[np.bool_]]) -> Any:
+    def since(self, name: str, holds: Callable[[Array], NDArray[np.bool_]]) -> NDArray[np.intp]:
         """The sample from which on something holds of a variable; `stop` where it does not hold at the end."""
-        start: Any = self.start
+        start: NDArray[np.intp] = np.asarray(self.start)
         for begin, piece in zip(range(self.start, self.stop, LONGEST), self.pieces(name), strict=True):
             broken = ~holds(piece)[..., ::-1]
             last = begin + broken.shape[-1] - broken.argmax(axis=-1)

@@ -1,7 +1,7 @@
 """What a verdict says, of a run, of a point of a sweep, and in Python."""
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, TypedDict
 
 from brakecli.analysis.regime.decision import Decision, Excitation, Regime, Thresholds
 from brakecli.solver.motion.flow import Orbit
@@ -67,8 +67,18 @@ class Verdict:
         return self.decision.sentence, *self.notes.values()
 
 
-def of_orbit(orbit: Orbit, radius: float) -> dict[str, Any]:
-    """The numbers of a verdict on a motion that has come to an orbit, by their names; radius in m."""
+class OfOrbit(TypedDict):
+    """The numbers of a verdict on a motion that has come to an orbit."""
+
+    amplitude: float
+    stick_fraction: float
+    contact_loss_fraction: float
+    mean_friction_force: float
+    braking_torque: float
+
+
+def of_orbit(orbit: Orbit, radius: float) -> OfOrbit:
+    """The numbers of a verdict on a motion that has come to an orbit; radius in m."""
     return {
         "amplitude": orbit.amplitude,
         "stick_fraction": orbit.stick_fraction,

@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from brakecli.analysis.spectrum import FEWEST_CYCLES, Array, interpolated
 
 _CYCLES = 8  # of the strongest line of the record in a frame, at least
-_SAME = 0.06  # part of its frequency by which a tone may move from frame to frame
+_SAME = 0.06  # part of its frequency by which a tone may move from frame to frame, or differ; a choice
 _Tone = tuple[int, float, float]  # first sample of a frame, and the frequency (1/sample) and power of its tone
 
 
@@ -27,10 +27,13 @@ class Burst:
         """Level squared times length."""
         return self.level**2 * (self.end - self.start)
 
+    def is_like(self, other: "Burst") -> bool:
+        """Whether it is the same tone."""
+        return abs(self.frequency - other.frequency) <= _SAME * other.frequency
+
     def is_part_of(self, other: "Burst") -> bool:
         """Whether it is the same tone at the same time."""
-        alike = abs(self.frequency - other.frequency) <= _SAME * other.frequency
-        return alike and other.start <= 0.5 * (self.start + self.end) <= other.end
+        return self.is_like(other) and other.start <= 0.5 * (self.start + self.end) <= other.end
 
     def numbers(self) -> dict[str, float]:
         """By the names of `--json`."""

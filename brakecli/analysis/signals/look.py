@@ -106,7 +106,7 @@ def look(
     judged = _judge(signal, *settings)
     tones = tuple(bursts(without_spikes(signal.values, quantity.order), step))
     verdict = replace(judged.verdict, bursts=tones)
-    filled = sum(tone.end - tone.start for tone in tones)
+    filled = sum(tone.end - tone.start for tone in tones)  # nearly all of it: then they are the record
     if tones and filled < 0.9 * len(signal.values) * step and verdict.regime is not Regime.RELAXATION:
         verdict = _of_bursts(signal, settings, verdict)
     return replace(judged, verdict=verdict)
@@ -117,7 +117,7 @@ def _of_bursts(signal: Signal, settings: _Settings, whole: SignalVerdict) -> Sig
     tones = whole.bursts
     step = signal.interval
     burst = max(tones, key=lambda tone: tone.energy)
-    like = [tone for tone in tones if abs(tone.frequency - burst.frequency) <= 0.06 * burst.frequency]  # a choice
+    like = [tone for tone in tones if tone.is_like(burst)]
     when = f"in a burst from {burst.start:.4g} to {burst.end:.4g} s"
     if len(like) > 1:
         when = f"in {len(like)} bursts, the strongest from {burst.start:.4g} to {burst.end:.4g} s"

@@ -9,7 +9,6 @@ import math
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.polynomial import Polynomial, polynomial
@@ -48,13 +47,16 @@ def edges(case: Case, key: str, size: float, contact_stiffness: float, sign: flo
     friction = Polynomial([case.friction.coefficient])
     stiff = case.link1.stiffness + case.link2.stiffness + contact_stiffness
     units = {"mass": case.shoe.mass, "stiffness": stiff, "damping": math.sqrt(stiff * case.shoe.mass)}
-    numbers: dict[str, Any] = {"shoe.mass": 1.0, "contact": contact_stiffness / stiff}
+    numbers: dict[str, float | Polynomial] = {"shoe.mass": 1.0, "contact": contact_stiffness / stiff}
     numbers |= {
         f"{name}.{what}": getattr(link, what) / units[what]
         for name, link in (("link1", case.link1), ("link2", case.link2))
         for what in ("stiffness", "damping")
     }
-    slopes: dict[str, Any] = {"link1": sin_cos(case.link1.angle_deg), "link2": sin_cos(case.link2.angle_deg)}
+    slopes: dict[str, tuple[float | Polynomial, float]] = {
+        "link1": sin_cos(case.link1.angle_deg),
+        "link2": sin_cos(case.link2.angle_deg),
+    }
     link, _, what = key.rpartition(".")
     if key in numbers:
         numbers[key] = size / units[what] * x

@@ -100,6 +100,30 @@ class Linear:
         return max(math.log(min(bounds, default=1.0)), 0.0) / self.mode.growth
 
 
+Theory = Callable[[], Linear | None]
+"""What gives the theory of a system, where it is asked for."""
+
+
+def theory_of(system: System) -> Theory:
+    """The theory at the speed at which a system ends."""
+    return cache(lambda: linear_theory(system, _last_speed(system)))
+
+
+def theories_of(systems: Sequence[System]) -> list[Theory]:
+    """The theories of all systems, in a third of the time; no number of one depends on the others."""
+
+    def constant(theory: Linear | None) -> Theory:
+        return lambda: theory
+
+    speeds = [_last_speed(system) for system in systems]
+    return [constant(theory) for theory in _by_waves(systems, speeds)]
+
+
+def linear_theory(system: System, belt: float) -> Linear | None:
+    """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
+    return _by_waves([system], [belt])[0]
+
+
 def parts(theories: Sequence[Linear], x: Array, time: Array) -> tuple[Array, Array, Array]:
     """What the waves force, by theories whose waves pass alike: half of peak to peak of x (m).
 
@@ -182,30 +206,6 @@ def _turns(frequencies: tuple[float, ...], time: bytes) -> Array:
     """Sines, then cosines of waves (Hz) at times (s)."""
     angles = 2.0 * math.pi * (np.outer(frequencies, np.frombuffer(time)) % 1.0)
     return np.concatenate([np.sin(angles), np.cos(angles)])
-
-
-Theory = Callable[[], Linear | None]
-"""What gives the theory of a system, where it is asked for."""
-
-
-def theory_of(system: System) -> Theory:
-    """The theory at the speed at which a system ends."""
-    return cache(lambda: linear_theory(system, _last_speed(system)))
-
-
-def theories_of(systems: Sequence[System]) -> list[Theory]:
-    """The theories of all systems, in a third of the time; no number of one depends on the others."""
-
-    def constant(theory: Linear | None) -> Theory:
-        return lambda: theory
-
-    speeds = [_last_speed(system) for system in systems]
-    return [constant(theory) for theory in _by_waves(systems, speeds)]
-
-
-def linear_theory(system: System, belt: float) -> Linear | None:
-    """The theory at a constant speed U (m/s); None where no rest in contact exists, or friction holds the shoe."""
-    return _by_waves([system], [belt])[0]
 
 
 def _last_speed(system: System) -> float:
