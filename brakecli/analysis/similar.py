@@ -119,7 +119,7 @@ class Similar(NamedTuple):
             own = f"the brake's own {self.friction:g} {far} that"
             same = f"{same}, {self.critical:.3g}; {own}: sliding is {'stable' if self.stable else 'unstable'}"
         if self.not_given:  # U m ω/Q needs all four
-            names, sizes = zip(*(each.split(": ") for each in self.not_given), strict=True)
+            names, sizes = zip(*(text.split(": ") for text in self.not_given), strict=True)
             many = "were not given: {} are those" if len(names) > 1 else "was not given: {} is that"
             said = many.format(_listed(sizes))
             missing = f"{_listed(names)} {said} of the starter, scaled, so that how it vibrates is not said"

@@ -2,13 +2,14 @@
 
 import math
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from brakecli.analysis.branches.follow import both_ways
 from brakecli.analysis.branches.newton import Newton, Settings, zero
 from brakecli.analysis.branches.point import Point
+from brakecli.analysis.branches.problem import Problem
 
 LEFT_OPEN = 4.0
 """Times by which the error may exceed the change with finer steps. An error of second order is 1.8 times that
@@ -22,21 +23,21 @@ class Bound(NamedTuple):
     error: float = 0.0  # by the bracket
     inner: Point | None = None  # the last stable motion; None where no steps are taken, or the range ends
     beyond: Point | None = None  # the first one that is not
-    problem: Any = None
+    problem: Problem | None = None
     known: bool = True  # otherwise the motion goes on, and nobody knows how far
 
     @property
     def bar(self) -> float:
         """The error of p: that of the bracket, and what steps leave open."""
         # errors of more steps and of more cells may cancel, so the end is located again with each of them alone
-        finer = self.problem.finer(1.5) if self.inner is not None else []
+        finer = self.problem.finer(1.5) if self.problem is not None and self.inner is not None else []
         if not finer:
             return self.error
         moved = [self._moved(problem) for problem in finer]
         # multipliers are checked to 1e-6, so no bar is narrower where steps are taken
         return max(self.error, 1e-6) + sum(LEFT_OPEN * abs(p - self.p) if p is not None else 1.0 for p in moved)
 
-    def _moved(self, finer: Any) -> float | None:
+    def _moved(self, finer: Problem) -> float | None:
         """Where the end is with finer steps; None where it is not found."""
         if self.inner is None or self.beyond is None:
             return None

@@ -120,7 +120,7 @@ def of_sliding(sliding: Sliding, slides: list[Slide], changes: list[Change]) -> 
 
 def _unstable(line: Line, slides: list[Slide], changes: list[Change]) -> list[tuple[float, float]]:
     """The values between which steady sliding is not stable, up to the changes beside its places."""
-    found = list[tuple[float, float]]()
+    spans = list[tuple[float, float]]()
     at = [change.p for change in changes]
     for grows, group in groupby(
         range(len(slides)), lambda k: slides[k].eigenvalues is not None and not slides[k].stable
@@ -133,8 +133,8 @@ def _unstable(line: Line, slides: list[Slide], changes: list[Change]) -> list[tu
             after = slides[min(places[-1] + 1, len(slides) - 1)].p
             low = max((p for p in at if before <= p <= first), default=first)
             high = min((p for p in at if last <= p <= after), default=last)
-            found.append((line.value(low), line.value(high)))
-    return found
+            spans.append((line.value(low), line.value(high)))
+    return spans
 
 
 def _modes(slide: Slide) -> tuple[Mode, ...]:

@@ -51,7 +51,7 @@ def unstable_spans(followed: Followed) -> list[Span]:
     branch = followed.branch
     points = branch.points if branch else []
     neutral = [mark.motion.amplitude for mark in followed.special if mark.kind == "flutter"]
-    found = list[Span]()
+    spans = list[Span]()
     for stable, group in groupby(range(len(points)), lambda k: points[k].stable):
         places = [*group]
         first = places[0]
@@ -61,11 +61,11 @@ def unstable_spans(followed: Followed) -> list[Span]:
         at = [points[k].p for k in places]
         at += [_bound(followed, first - 1, 1).p] if first else []
         at += [_bound(followed, last + 1, -1).p] if last + 1 < len(points) else []
-        turns = [each for each in branch.specials if each.kind == "fold"] if branch else []
+        turns = [special for special in branch.specials if special.kind == "fold"] if branch else []
         at += [fold.p for fold in turns if points[first].s < fold.s < points[last].s]
         if max(at) > min(at) + NARROWEST:
-            found.append((min(at), max(at)))
-    return found
+            spans.append((min(at), max(at)))
+    return spans
 
 
 def _turns(followed: Followed, places: list[int], way: int) -> list[Bound]:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
 
 from brakecli.analysis.regime.answers import Answers
 from brakecli.analysis.regime.context import Context
@@ -54,7 +53,7 @@ def _verdict(shown: Shown, record: Answers, decision: Decision, what: Lasting, *
     if decision.excitation is Excitation.SELF_EXCITED and cycles:
         decision = decision._replace(frequency=what.frequency)
         record = record._replace(frequency=what.frequency or math.nan)
-    evidence: dict[str, Any] = {"row": decision.row}
+    evidence: dict[str, object] = {"row": decision.row}
     if in_full:
         evidence |= record.known() | what.evidence | _further(shown, what, shown.context)
     theory = shown.linear if record.linear else None
@@ -90,11 +89,11 @@ def _verdict(shown: Shown, record: Answers, decision: Decision, what: Lasting, *
     return replace(verdict, **of_orbit(what.orbit, radius)) if what.orbit else verdict
 
 
-def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, Any]:
+def _further(shown: Shown, what: Lasting, context: Context) -> dict[str, object]:
     """Evidence on the settled part that no row needs."""
     stretch = what.stretch
     belt = context.belt_speed
-    evidence: dict[str, Any] = {f"amplitude_{name}": stretch.amplitude(name) for name in ("y", "vx", "vy")}
+    evidence: dict[str, object] = {f"amplitude_{name}": stretch.amplitude(name) for name in ("y", "vx", "vy")}
     if belt != 0.0:
         evidence["largest_vx_over_belt_speed"] = stretch.extremes("vx")[int(belt > 0.0)] / belt
     if context.steady:

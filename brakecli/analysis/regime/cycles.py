@@ -129,7 +129,7 @@ def contact_time(events: Events, begin: float, end: float) -> float:
     return float(end - begin - away) / touches if touches else np.inf
 
 
-def in_lines(stretch: Stretch, frequency: float) -> dict[str, Any]:
+def in_lines(stretch: Stretch, frequency: float) -> dict[str, float | list[float]]:
     """Parts of the energy of vx in a line (Hz) and its harmonics, and their amplitudes over its own."""
     first, *higher = (stretch.share([n * frequency]) for n in range(1, 6))
     multiples = range(1, 1 + int(0.5 / (frequency * stretch.history.interval)))

@@ -91,8 +91,8 @@ class Heard:
         tones = (np.abs(spectrum) ** 2 > CERTAIN * noise) & (turn > 2.0 * np.pi * often / DRIFT_CYCLES)
         if not tones.any():
             return math.nan, math.nan
-        held = np.zeros(len(spectrum))
-        held[tones] = (noise * np.ones(len(spectrum)))[tones] / np.abs(gain[tones]) ** 2
+        in_tones = np.zeros(len(spectrum))
+        in_tones[tones] = (noise * np.ones(len(spectrum)))[tones] / np.abs(gain[tones]) ** 2
         x = np.zeros(len(spectrum), np.complex128)
         x[tones] = spectrum[tones] / gain[tones]
         # of 32 samples of a cycle the largest is 1/2 % below the peak at most, (π/32)²/2
@@ -101,9 +101,9 @@ class Heard:
         middle = slice(len(moved) // 4, 3 * len(moved) // 4)
         moved = moved[middle] / np.interp(np.arange(len(moved))[middle] / finer, np.arange(count), window)
         windows = int(np.clip(0.5 * often * count / _WINDOW_CYCLES, 1, WINDOWS))
-        sizes = [0.5 * float(np.ptp(part)) for part in np.array_split(moved, windows)]
+        sizes = [0.5 * float(np.ptp(piece)) for piece in np.array_split(moved, windows)]
         low, size, high = map(float, np.quantile(sizes, [1.0 / 6.0, 0.5, 5.0 / 6.0]))
-        return size, math.hypot(0.5 * (high - low), math.sqrt(2.0 * float(held.sum())) / count)
+        return size, math.hypot(0.5 * (high - low), math.sqrt(2.0 * float(in_tones.sum())) / count)
 
     @cached_property
     def lines(self) -> Array:
