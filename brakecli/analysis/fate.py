@@ -118,7 +118,7 @@ def fate_on_smooth_pads(
         return Fate(Kind.UNKNOWN)
     while motion.steps < MOST_STEPS and motion.time < within and not signalled():
         if rate > 0.0 and until is None:
-            # a motion without events nears sliding for as long as a disturbance grows by a factor of e
+            # without an event for as long as disturbances take to grow by a factor of e it nears sliding
             motion.way.duration = motion.time + max(1.0 / rate, 10_000 * motion.path.h)
         outcome = motion.seek()
         if outcome == LINEAR:

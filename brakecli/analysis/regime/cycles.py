@@ -168,7 +168,7 @@ def _unseen(places: Array) -> tuple[float, float]:
 def _beginnings(stretch: Stretch, events: Events, known: float) -> tuple[Array, int]:
     """When cycles begin (s), and how many rises of x each holds: after so many the motion repeats.
 
-    A rise in which the mean of vx stays within a band about 0 is ripple: of four bands the first is taken with
+    A rise whose mean vx lies within a band, a part of its level, is ripple: of four bands the first is taken with
     which the motion repeats. Where its period (s) is `known`, that says after how many rises: samples take rises
     for the same that differ by less than they show.
     """

@@ -134,7 +134,7 @@ def _beating(shown: Shown, stretch: Stretch) -> float:
     if not (theory := shown.context.linear()):
         return 1.0
     x, time = stretch.places()
-    (forced,), (lasting,), _ = parts([theory], x[None, ::8], time[::8])
+    (forced,), (lasting,), _ = parts([theory], x[None, ::8], time[::8])  # one place of eight suffices
     return 2.0 * float(forced) / max(float(np.ptp(lasting)), 1e-300)
 
 

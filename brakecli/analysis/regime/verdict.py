@@ -58,7 +58,7 @@ class Verdict:
         if self.regime is Regime.UNDECIDED:
             return self.decision.longer
         if self.excitation is Excitation.NONE:
-            return not self.settled and self.remaining > 0.01
+            return not self.settled and self.remaining > 0.01  # less is nothing any more
         return self.longer
 
     @property

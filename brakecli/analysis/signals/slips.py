@@ -93,7 +93,7 @@ def _shaped(slips: Slips, velocity: Velocity) -> Slips:
     # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
     starts, depths = _falls(uniform_filter1d(x, 1 + scale // 2), slips.places, scale)
     strong = depths >= 0.4 * np.sort(depths)[-min(_FEWEST, len(depths)) :][0] if len(depths) else depths > 0.0
-    if strong.sum() < 3:
+    if strong.sum() < 3:  # the shape of weaker ones is not looked at
         return slips
     lasts = _lasting(x, starts[strong], scale) / max(float(depths[strong].mean()), 1e-300)
     returns = _returning(x, starts[strong], min(velocity.quiet, scale), scale)
