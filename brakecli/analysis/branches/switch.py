@@ -9,6 +9,9 @@ from brakecli.analysis.branches.newton import FROM_AFAR, LEFT, Newton, Settings
 from brakecli.analysis.branches.point import Point
 from brakecli.analysis.branches.problem import Array, Doubled
 
+DISTANCES: tuple[float, ...] = 1e-2, 3e-3, 1e-3, 3e-4
+"""Distances from the flip at which the doubled motion is sought."""
+
 
 OBLIQUE = 4.0
 """Distances along a branch, over that across it, within which a sheet that crosses it is sought; a choice."""
@@ -32,7 +35,7 @@ def switch(problem: Doubled, point: Point, settings: Settings | None = None) -> 
     onward = direction / math.sqrt(direction @ direction)
     newton = Newton(problem, settings or Settings())
     flip = np.append(u, point.p)
-    for distance in (1e-2, 3e-3, 1e-3, 3e-4):
+    for distance in DISTANCES:
         new = newton.solve(flip + distance * onward, onward, onward, 0.0, exact=True, most=FROM_AFAR)
         if new is not None:
             off = new.z - flip - distance * onward
