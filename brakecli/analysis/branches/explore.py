@@ -6,7 +6,6 @@ from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from itertools import pairwise
 from time import perf_counter
-from typing import Any
 
 import numpy as np
 
@@ -108,7 +107,7 @@ class Explorer:
         self.waves = None if line.case.roughness.wheel is None else self._waves()
 
     def explore(
-        self, states: Sequence[tuple[float, Any]] = (), switches: bool = False, pushes: int = 0
+        self, states: Sequence[tuple[float, Array]] = (), switches: bool = False, pushes: int = 0
     ) -> Explored:
         """Follow everything: from flutter, from given states (p and state), and from flips if that is wanted.
 
@@ -143,7 +142,7 @@ class Explorer:
             unfollowed=[*self.unfollowed],
         )
 
-    def begin_at(self, p: float, state: Any) -> None:
+    def begin_at(self, p: float, state: Array) -> None:
         """Follow the branch of the motion that a state at a place comes to, if it is not known."""
         if self.line.case.roughness.wheel is None:
             if not self._over() and not is_undamped(self.line.case_coefficients):
@@ -153,7 +152,7 @@ class Explorer:
 
     def _follow(
         self,
-        problem: Any,
+        problem: Cycles | Forced,
         first: Point,
         kind: str = LIMIT_CYCLE,
         note: str = "",
@@ -252,7 +251,7 @@ class Explorer:
         if len(self.branches) == 1 and not self.stop():
             self.notes.append("no motion was found that the waves force")
 
-    def _forced_from(self, problem: Forced, p: float, state: Any) -> None:
+    def _forced_from(self, problem: Forced, p: float, state: Array) -> None:
         """The branch of the forced motion that a run comes to; none where it is known already."""
         value = self.line.value(p)
         motion = None if self._over() else problem.settle(p, state)
@@ -267,7 +266,7 @@ class Explorer:
         """Whether a motion lies on a branch that has been followed, perhaps as several of its periods."""
         return any(lies_on(followed, first) for followed in self.branches)
 
-    def _from_state(self, sliding: Sliding, p: float, state: Any) -> None:
+    def _from_state(self, sliding: Sliding, p: float, state: Array) -> None:
         """The branch of the cycle that a motion comes to; none where it is known already."""
         values = sliding.at(p).eigenvalues
         frequency = 0.0
@@ -304,7 +303,7 @@ class Explorer:
                 self._from_push(p, np.array(orbit.state), most)
         search.seconds = perf_counter() - begun
 
-    def _from_push(self, p: float, state: Any, most: int) -> None:
+    def _from_push(self, p: float, state: Array, most: int) -> None:
         """The branch of the cycle that a push has come to, among so many; none where it is known already."""
         value = self.line.value(p)
         problem = self._problem()
@@ -332,7 +331,9 @@ class Explorer:
     def _doubled(self) -> None:
         """The motions of twice the period that are born at flips."""
         for origin in list(self.branches):
-            for special in origin.branch.specials if origin.branch is not None else ():
+            if origin.branch is None or origin.problem is None:
+                continue
+            for special in origin.branch.specials:
                 if special.kind != "flip" or self._over():
                     continue
                 problem = origin.problem.of_periods(2 * origin.problem.periods)
@@ -384,9 +385,11 @@ def meets(one: Followed, other: Followed) -> bool:
 
 def passes(followed: Followed, motion: Point) -> bool:
     """Whether a branch passes through a motion: there, in the plane across its chord that holds the motion."""
-    points = followed.branch.points if followed.branch is not None else []
-    newton = Newton(followed.problem, Settings())
-    for one, other in pairwise(points):
+    problem = followed.problem
+    if followed.branch is None or problem is None:
+        return False
+    newton = Newton(problem, Settings())
+    for one, other in pairwise(followed.branch.points):
         if one.chart is not motion.chart or other.chart is not motion.chart:
             continue
         chord = other.z - one.z
@@ -398,7 +401,7 @@ def passes(followed: Followed, motion: Point) -> bool:
         fraction = _across(one, other, motion, chord)
         if np.linalg.norm(cubic(one, other, fraction) - motion.z) > LEFT * length + OFF:
             continue
-        followed.problem.use(one.chart)
+        problem.use(one.chart)
         point = newton.between(one, other, fraction)
         if point is not None and np.linalg.norm(point.z - motion.z) < SAME:
             return True
@@ -414,15 +417,16 @@ def _across(one: Point, other: Point, motion: Point, chord: Array) -> float:
 def crossing(followed: Followed, p: float) -> list[Point]:
     """The motions of a branch at a place of the line."""
     motions: list[Point] = []
-    if followed.branch is None:
+    problem = followed.problem
+    if followed.branch is None or problem is None:
         return motions
-    newton = Newton(followed.problem, Settings())
+    newton = Newton(problem, Settings())
     turns = [special.point for special in followed.branch.specials if special.kind == "fold"]
     along = sorted([*followed.branch.points, *turns], key=lambda point: point.s)  # stable, where charts change
     for one, other in pairwise(along):
         if one.chart is not other.chart or not (one.p - p) * (other.p - p) <= 0.0 or one.p == other.p:
             continue
-        followed.problem.use(one.chart)
+        problem.use(one.chart)
         guess = _near(one, other, p)
         point = newton.at_parameter(guess, p, other.z - one.z, one.s, exact=True)
         if point is not None:

@@ -4,12 +4,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from itertools import groupby, pairwise
-from typing import Any
 
 import numpy as np
 
+from brakecli.analysis.branches.cycles import Cycles
 from brakecli.analysis.branches.extent import Extent
 from brakecli.analysis.branches.follow import Stop
+from brakecli.analysis.branches.forced import Forced
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.newton import Newton, Settings
 from brakecli.analysis.branches.point import Branch, End, Point, Special
@@ -66,7 +67,7 @@ class Followed:
     points: list[Row]
     special: list[Mark]
     branch: Branch | None = None
-    problem: Any = None
+    problem: Cycles | Forced | None = None
     note: str = ""
     unstable: Callable[[], list[tuple[float, float]]] = list
     """The values between which it is not stable, in its order; computed where they are asked for."""
@@ -152,7 +153,7 @@ def _at_rest(line: Line, slide: Slide, frequency: float) -> Motion:
 def of_branch(
     line: Line,
     branch: Branch,
-    problem: Any,
+    problem: Cycles | Forced,
     kind: str,
     change: Change | None = None,
     changes: Sequence[Change] = (),
@@ -178,7 +179,7 @@ def of_branch(
     return Followed(kind, _rows(line, points, problem), marks, replace(branch, points=points), problem)
 
 
-def _rows(line: Line, points: list[Point], problem: Any) -> list[Row]:
+def _rows(line: Line, points: list[Point], problem: Cycles | Forced) -> list[Row]:
     return [
         Row(_moving(line.value(point.p), point, problem), point.stable, tuple(point.multipliers.tolist()))
         for point in points
@@ -188,19 +189,20 @@ def _rows(line: Line, points: list[Point], problem: Any) -> list[Row]:
 def finer(line: Line, followed: Followed, stop: Stop) -> Followed:
     """A branch with more motions, where it bends so much between two that a straight line does not show it."""
     branch = followed.branch
-    if branch is None:
+    problem = followed.problem
+    if branch is None or problem is None:
         return followed
     points = [*branch.points]
-    newton = Newton(followed.problem, Settings())
+    newton = Newton(problem, Settings())
     for _ in range(5):  # each time to a quarter of the distance: from all of an amplitude
         for k in reversed(_bent(points)):
             one = points[k]
             other = points[k + 1]
-            followed.problem.use(one.chart)
+            problem.use(one.chart)
             middle = None if stop() else newton.between(one, other, 0.5)
             if middle is not None and middle.word == one.word and middle.stable in (one.stable, other.stable):
                 points.insert(k + 1, middle)
-    rows = _rows(line, points, followed.problem)
+    rows = _rows(line, points, problem)
     return replace(followed, points=rows, branch=replace(branch, points=points))
 
 
@@ -225,7 +227,7 @@ def _bent(points: list[Point]) -> list[int]:
     return [k for k, far in zip(strides, bent.tolist(), strict=True) if far]
 
 
-def _moving(value: float, point: Point, problem: Any) -> Motion:
+def _moving(value: float, point: Point, problem: Cycles | Forced) -> Motion:
     """A motion that repeats."""
     cycle = point.facts
     return Motion(
@@ -238,7 +240,7 @@ def _moving(value: float, point: Point, problem: Any) -> Motion:
     )
 
 
-def _mark(line: Line, special: Special, problem: Any, ended: Sequence[End] = ()) -> Mark:
+def _mark(line: Line, special: Special, problem: Cycles | Forced, ended: Sequence[End] = ()) -> Mark:
     kind = special.name if special.kind == "grazing" else special.kind
     if kind.startswith("sequence"):
         kind = "grazing stick"

@@ -73,7 +73,7 @@ def search(critical: Critical, line: Line) -> Search:
 
     lasting = sustained(answers, critical.tolerance, result)
     coexists = [answers.coexists_from]
-    if lasting.at is not None and result.unstable_at(lasting.at) is False:
+    if lasting.at is not None and lasting.state is not None and result.unstable_at(lasting.at) is False:
         notes = [*explorer.notes]
         explorer.begin_at(explorer.line.place(lasting.at), lasting.state)
         explorer.notes = notes  # a user has given no motion
