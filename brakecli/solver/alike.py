@@ -12,18 +12,18 @@ def at_once(keys: Sequence[Hashable], compute: Callable[[list[int]], Iterable[An
 
     `compute` gets the places of those that are alike, and gives what it finds of each in this order.
     """
-    found = list[Any]([None] * len(keys))
+    results = list[Any]([None] * len(keys))
     alike = defaultdict[Hashable, list[int]](list)
-    for place, key in enumerate(keys):
+    for index, key in enumerate(keys):
         if key is not None:
-            alike[key].append(place)
-    for places in alike.values():
-        for place, each in zip(places, compute(places), strict=True):
-            found[place] = each
-    return found
+            alike[key].append(index)
+    for indices in alike.values():
+        for index, result in zip(indices, compute(indices), strict=True):
+            results[index] = result
+    return results
 
 
 def by_rows(columns: dict[str, NDArray[Any]]) -> list[dict[str, Any]]:
     """The rows of columns, numbers of Python by the names of the columns."""
-    rows = zip(*(each.tolist() for each in columns.values()), strict=True)
+    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
     return [dict(zip(columns, row, strict=True)) for row in rows]

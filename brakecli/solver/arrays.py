@@ -4,7 +4,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-VECTOR = 1
-ROWS = 2
-CUBE = 3
+Integers = NDArray[np.int64]
+VECTOR, ROWS, CUBE = range(1, 4)
 """Contiguous arrays of doubles in the signature of an entry: their dimensions."""

@@ -18,7 +18,6 @@ import zlib
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from brakecli.solver import cache_folder, compiling
 from brakecli.solver.cache_folder import HOW, LAZY, MANIFEST, REMEDY
@@ -33,10 +32,7 @@ MOST_CHILDREN = 4
 """Processes that compile, at most: each takes 1 GB, and with more of them the largest kernel sets the time."""
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """Where a container says how much time (µs) it may take of each period (µs), on all cores together."""
-PROCESSOR_SECONDS = 150.0
-"""Time (s) that one core takes for all kernels, about."""
 _LARGEST = 1_000_000  # bytes of a manifest
-_LARGEST_KERNEL = 100_000_000  # bytes of a file
 TOTAL = "total"
 _STAMP = "stamp.json"  # in the folder of each kernel: its files with their sizes and checksums
 _TRIED = 8_000_000  # bytes that are written for a trial
@@ -76,8 +72,8 @@ def prepare(folder: Path, facts: dict[str, str]) -> str:
 
     Returns what keeps them from it, as a sentence without its full stop, or an empty text.
     """
-    if (asked := os.environ.get(HOW)) not in (None, "", LAZY, CHILD):
-        compiling.warn(f"{HOW}: unknown value (found {asked!r}); it may be {LAZY!r}")
+    if (how := os.environ.get(HOW)) not in (None, "", LAZY, CHILD):
+        compiling.warn(f"{HOW}: unknown value (found {how!r}); it may be {LAZY!r}")
     if is_lazy() or is_child() or _fits(folder, facts):
         return ""
     try:
@@ -103,7 +99,7 @@ def _made(folder: Path, facts: dict[str, str], lock: int) -> str:
         return ""
     if not waits:
         _wipe(folder)
-    with compiling.progress(PROCESSOR_SECONDS / min(cores(), MOST_CHILDREN)) as tell:
+    with compiling.progress(150.0 / min(cores(), MOST_CHILDREN)) as tell:  # 150 s of one core, about
         if waits:
             while not _is_ours(lock):
                 tell(*_come(folder))
@@ -121,44 +117,44 @@ def _made(folder: Path, facts: dict[str, str], lock: int) -> str:
         return why
 
 
-def is_sound(place: Path) -> bool:
+def is_sound(folder: Path) -> bool:
     """Whether a folder holds machine code as it was written: damaged code would end the process."""
-    return _matches(place, lambda path, size, checksum: _stamp(path) == [size, checksum])
+    return _matches(folder, lambda path, size, checksum: _stamp(path) == [size, checksum])
 
 
-def vouch(place: Path) -> None:
+def vouch(folder: Path) -> None:
     """Write down what a folder holds, whose kernel has just been compiled."""
-    files = {str(path.relative_to(place)): _stamp(path) for path in sorted(place.rglob("*.nb?"))}
-    write(place / _STAMP, json.dumps(files))
+    files = {str(path.relative_to(folder)): _stamp(path) for path in sorted(folder.rglob("*.nb?"))}
+    write(folder / _STAMP, json.dumps(files))
 
 
-def emptied(place: Path) -> Path | None:
+def emptied(folder: Path) -> Path | None:
     """A folder for the machine code of a kernel, without what does not fit; None where it cannot be kept."""
     try:
-        place.mkdir(mode=cache_folder.OURS, exist_ok=True)
-        for path in place.iterdir():
+        folder.mkdir(mode=cache_folder.OURS, exist_ok=True)
+        for path in folder.iterdir():
             _remove(path)
     except OSError:
         return None
-    return place if is_ours(place) else None
+    return folder if is_ours(folder) else None
 
 
-def is_ours(place: Path) -> bool:
+def is_ours(folder: Path) -> bool:
     """Whether this process may write in a folder and all below it: otherwise Numba takes another place."""
-    return all(os.access(each, os.W_OK) for each in (place, *place.rglob("*/")))
+    return all(os.access(path, os.W_OK) for path in (folder, *folder.rglob("*/")))
 
 
-def _matches(place: Path, matches: Callable[[Path, int, int], bool]) -> bool:
+def _matches(folder: Path, matches: Callable[[Path, int, int], bool]) -> bool:
     """Whether there is what is written down of a folder, and each file of it matches its size and checksum."""
     with suppress(OSError, ValueError, LookupError, TypeError, AttributeError, RecursionError):
-        files = json.loads(cache_folder.read(place / _STAMP, _LARGEST))
-        return bool(files) and all(matches(place / name, *stamp) for name, stamp in files.items())
+        files = json.loads(cache_folder.read(folder / _STAMP, _LARGEST))
+        return bool(files) and all(matches(folder / name, *stamp) for name, stamp in files.items())
     return False
 
 
 def _stamp(path: Path) -> list[int]:
     """Size and checksum of a file."""
-    contents = cache_folder.read(path, _LARGEST_KERNEL)
+    contents = cache_folder.read(path, cache_folder.LARGEST)
     return [len(contents), zlib.crc32(contents)]
 
 
@@ -169,18 +165,14 @@ def forget(folder: Path) -> None:
 
 def _stamps() -> dict[str, list[int]]:
     """Time and size of each source: Numba compares them."""
-    found = {str(path.relative_to(SOLVER)): path.stat() for path in sorted(SOLVER.rglob("*.py"))}
-    return {name: [status.st_mtime_ns, status.st_size] for name, status in found.items()}
-
-
-def _manifest(folder: Path) -> Any:
-    return json.loads(cache_folder.read(folder / MANIFEST, _LARGEST))
+    statuses = {str(path.relative_to(SOLVER)): path.stat() for path in sorted(SOLVER.rglob("*.py"))}
+    return {name: [status.st_mtime_ns, status.st_size] for name, status in statuses.items()}
 
 
 def _fits(folder: Path, facts: dict[str, str]) -> bool:
     """Whether the manifest says that all kernels are there, and they are."""
     try:
-        manifest = _manifest(folder)
+        manifest = json.loads(cache_folder.read(folder / MANIFEST, _LARGEST))
         names = manifest["names"]
         made = bool(names) and manifest["facts"] == facts and manifest["sources"] == _stamps()
         return made and all(
@@ -255,10 +247,10 @@ def _places() -> list[str]:
         here = os.getcwd()  # noqa: PTH109 - pathlib's is the same
     except OSError:
         here = ""
-    texts = [place for place in sys.path if isinstance(place, str)]  # Python passes over others
-    found = [place for place in texts if place and os.path.isabs(place) and place != here]  # noqa: PTH117
+    texts = [path for path in sys.path if isinstance(path, str)]  # Python passes over others
+    absolute = [path for path in texts if path and os.path.isabs(path) and path != here]  # noqa: PTH117
     root = str(SOLVER.parent.parent)
-    return found if root in found else [root, *found]
+    return absolute if root in absolute else [root, *absolute]
 
 
 def _compiled(folder: Path, tell: compiling.Tell) -> str:

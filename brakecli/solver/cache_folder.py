@@ -36,8 +36,7 @@ MANIFEST = "manifest.json"
 REMEDY = "name a folder of your own with XDG_CACHE_HOME"
 
 _TEMPORARY = "brakecli-kernels-"  # what the names of temporary caches begin with, before the process
-_STALE = 3600.0  # s
-_LARGEST = 100_000_000  # bytes of a file of the cache
+LARGEST = 100_000_000  # bytes of a file of the cache
 
 
 def opened(facts: Mapping[str, str]) -> Path | None:
@@ -82,7 +81,7 @@ def _temporary(name: str, like: Path | None) -> Path | None:
             if path.is_dir():
                 made.mkdir(mode=OURS)
             else:
-                made.write_bytes(read(path, _LARGEST))
+                made.write_bytes(read(path, LARGEST))
     except (OSError, RuntimeError):
         _removed(base, os.getpid())
         return None
@@ -95,7 +94,8 @@ def _remove_stale() -> None:
         with suppress(OSError, ValueError):
             status = path.lstat()
             owner = int(path.name.removeprefix(_TEMPORARY).partition("-")[0])
-            if status.st_uid == os.geteuid() and time.time() - status.st_mtime > _STALE and not _is_running(owner):
+            is_old = time.time() - status.st_mtime > 3600.0  # s
+            if status.st_uid == os.geteuid() and is_old and not _is_running(owner):
                 shutil.rmtree(path, ignore_errors=True)
 
 
@@ -128,16 +128,16 @@ def prepare(name: str = "") -> Path:
     named = os.environ.get(BASE) or os.environ.get("NUMBA_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME")
     base = Path(named) if named else Path.home() / ".cache"
     folder = base.absolute() / "brakecli" / f"{source_hash()}{name}"
-    for each in [*reversed(folder.parents), folder]:
-        if not each.exists():
-            each.mkdir(mode=OURS, exist_ok=True)
+    for above in [*reversed(folder.parents), folder]:
+        if not above.exists():
+            above.mkdir(mode=OURS, exist_ok=True)
     if folder.is_symlink():
         raise _refused(folder, "it is a link")
     real = folder.resolve()
-    for each in real.parents:
-        refuse_shared(each)
-    found = real.lstat()
-    if not stat.S_ISDIR(found.st_mode) or found.st_uid != os.geteuid() or found.st_mode & FOR_OTHERS:
+    for above in real.parents:
+        refuse_shared(above)
+    status = real.lstat()
+    if not stat.S_ISDIR(status.st_mode) or status.st_uid != os.geteuid() or status.st_mode & FOR_OTHERS:
         raise _refused(folder, "it is not a folder in which this user alone writes")
     return real
 
@@ -146,8 +146,8 @@ def read(path: Path, most: int) -> bytes:
     """The contents of a file of the cache; raises OSError where it is no file, or longer than so many bytes."""
     file = os.open(path, os.O_RDONLY | os.O_NONBLOCK | os.O_NOFOLLOW | os.O_CLOEXEC)
     with open(file, "rb") as opened:  # noqa: PTH123 - a descriptor
-        found = os.fstat(file)
-        if not stat.S_ISREG(found.st_mode) or found.st_size > most:
+        status = os.fstat(file)
+        if not stat.S_ISREG(status.st_mode) or status.st_size > most:
             raise OSError(errno.EINVAL, "it is no file of the cache", str(path))
         return opened.read()
 
@@ -167,13 +167,13 @@ def refuse_shared(folder: Path) -> None:
     They can where they own it, or where they may write there without the sticky bit. A group of which the user is
     the only member is no other.
     """
-    found = folder.lstat()
-    if found.st_uid not in (0, os.geteuid()):
+    status = folder.lstat()
+    if status.st_uid not in (0, os.geteuid()):
         raise _refused(folder, "it belongs to another user")
-    shared = found.st_mode & FOR_OTHERS
-    if shared == stat.S_IWGRP and is_private(found.st_gid):
+    shared = status.st_mode & FOR_OTHERS
+    if shared == stat.S_IWGRP and is_private(status.st_gid):
         shared = 0
-    if shared and not found.st_mode & stat.S_ISVTX:
+    if shared and not status.st_mode & stat.S_ISVTX:
         raise _refused(folder, "others may write there")
 
 
@@ -181,10 +181,10 @@ def is_private(group: int) -> bool:
     """Whether a group is the user's own, as many systems give to each: of his name, and without other members."""
     try:
         user = pwd.getpwuid(os.geteuid())
-        found = grp.getgrgid(group)
+        own = grp.getgrgid(group)
     except KeyError:
         return False
-    return user.pw_gid == group and found.gr_name == user.pw_name and set(found.gr_mem) <= {user.pw_name}
+    return user.pw_gid == group and own.gr_name == user.pw_name and set(own.gr_mem) <= {user.pw_name}
 
 
 def _refused(folder: Path, why: str) -> PermissionError:

@@ -29,11 +29,11 @@ def child(where: str, k: str) -> None:
     if folder != kernels.folder():
         raise SystemExit(f"the cache is {kernels.folder()}")
     write(folder / TOTAL, str(len(kernels.entries)))
-    for each in kernels.entries[:: -1 if int(k) % 2 else 1]:
+    for entry in kernels.entries[:: -1 if int(k) % 2 else 1]:
         try:
-            (folder / each.name).mkdir(mode=cache_folder.OURS)
+            (folder / entry.name).mkdir(mode=cache_folder.OURS)
         except FileExistsError:
             continue
-        each.load()
-        if not is_sound(folder / each.name):
+        entry.load()
+        if not is_sound(folder / entry.name):
             raise SystemExit("no more can be written there")

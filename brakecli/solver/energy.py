@@ -5,7 +5,7 @@ from dataclasses import dataclass, fields
 from typing import Any
 
 from brakecli.solver.coefficients import Coefficients
-from brakecli.solver.records import Weights
+from brakecli.solver.records import Weights, Works
 
 OPEN_ACCOUNT = 0.1
 """Relative closing error from which on a motion is not worth having: the step does not resolve it."""
@@ -63,22 +63,22 @@ def energy_at_level(c: Coefficients, s: Weights, state: Any) -> Mechanical:
     return kinetic, links_energy(c, state.x, state.y), (state.x, state.y), 0.0
 
 
-def account(start: tuple[float, float, float], end: tuple[float, float, float], work: Any) -> EnergyAccount:
+def account(start: tuple[float, float, float], end: tuple[float, float, float], work: Works) -> EnergyAccount:
     """The account between two states, each as energies (kinetic, links, contact), from the works in between."""
     kinetic, links, contact = (after - before for before, after in zip(start, end, strict=True))
     return EnergyAccount(
         kinetic=kinetic,
         links=links,
         contact=contact,
-        belt=float(work["belt"]),
-        friction=float(work["friction"]),
-        dashpots=float(work["dashpots"]),
-        load=float(work["load"]),
-        roughness=float(work["roughness"]),
-        scheme=float(work["scheme"]),
+        belt=float(work.belt),
+        friction=float(work.friction),
+        dashpots=float(work.dashpots),
+        load=float(work.load),
+        roughness=float(work.roughness),
+        scheme=float(work.scheme),
         stored=max(sum(start), sum(end)),
     )
 
 
-NOT_KEPT = EnergyAccount(**{each.name: math.nan for each in fields(EnergyAccount)})
+NOT_KEPT = EnergyAccount(**{item.name: math.nan for item in fields(EnergyAccount)})
 """Account of a run that keeps none: all entries are NaN."""

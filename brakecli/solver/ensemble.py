@@ -10,7 +10,6 @@ import time
 from collections.abc import Hashable, Sequence
 from functools import lru_cache
 from itertools import repeat
-from typing import Any
 
 import numpy as np
 
@@ -22,7 +21,7 @@ from brakecli.solver.energy import NOT_KEPT
 from brakecli.solver.integrate import Motion, OwnError, Work
 from brakecli.solver.kernels import load
 from brakecli.solver.lanes import advance
-from brakecli.solver.lanes.records import LANE, LANES, SHARED, WAVES, Shared
+from brakecli.solver.lanes.records import LANES, WAVES, Lane, Levels, Shared
 from brakecli.solver.lanes.steps import THETA_1
 from brakecli.solver.quantities import HISTORY
 from brakecli.solver.records import PARTS, new
@@ -37,11 +36,6 @@ LEFT = 1e-3
 MOST_SAMPLES = 1 << 14
 """Most samples of a run in a lane, so that the histories of all lanes take little memory."""
 
-_CONTRACTION = 0.1  # of the iteration, at most
-# of the tables at the nodes, and between two samples
-_MOST_BYTES = 1e8
-_MOST_STEPS = 1e9
-_MOST_PASSED = 1e6  # waves, beyond which their phase needs more than 16 digits
 
 Start = tuple[float, float, float, float]
 
@@ -54,18 +48,21 @@ def fits(system: System) -> Hashable | None:
     kind = method.scheme, method.theta, method.start, method.iteration, system.evaluator
     if kind != ("three-layer", NUMEROV, "consistent", "newton", "midpoint") or not 0 < len(wheel.g) <= WAVES:
         return None
-    large = system.samples > MOST_SAMPLES or system.table_bytes > _MOST_BYTES or system.per_sample > _MOST_STEPS
+    # tables at the nodes, and steps between two samples
+    large = system.samples > MOST_SAMPLES or system.table_bytes > 1e8 or system.per_sample > 1e9
     if not system.steady or sliding == 0.0 or large:
         return None
-    if system.passing_frequency * system.sampled_duration > _MOST_PASSED:
+    if system.passing_frequency * system.sampled_duration > 1e6:  # their phase needs more than 16 digits
         return None
     grid = system.interval, system.per_sample, system.samples
     return system.half_length, system.shoe, wheel, system.nodes, *grid, system.tangents
 
 
 @lru_cache(maxsize=4)
-def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tuple[dict[str, Any], Floats]:
-    """What `SHARED` holds of the surfaces, by its names, and the table of an even number of nodes."""
+def _tables(
+    half_length: float, shoe: Surface, wheel: Surface, nodes: int
+) -> tuple[dict[str, float | Floats], Floats]:
+    """What `Shared` holds of the surfaces, by its names, and the table of an even number of nodes."""
     pad, tables = build_pad(1.0, half_length, shoe, wheel, nodes)
     half = nodes // 2
     waves = np.zeros((WAVES, 3))
@@ -82,7 +79,7 @@ def _tables(half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> tu
     for wave, function in np.ndindex(own, 2):
         right = _means(by_tiles[:, wave, function].ravel()[: half + 1])
         table[:, 2 + function * WAVES + wave] = right[::-1] * (-1.0, 1.0)[function]
-    numbers = {
+    numbers: dict[str, float | Floats] = {
         "length": 2.0 * half_length,
         "full_up_to": float(pad.full_up_to),
         "clear_from": float(pad.clear_from),
@@ -104,7 +101,7 @@ def run_together(systems: Sequence[System]) -> list[Motion | None]:
     have an exponent.
     """
     firsts = range(0, len(systems), LANES)
-    return [found for first in firsts for found in _run_lanes(list(systems[first : first + LANES]))]
+    return [motion for first in firsts for motion in _run_lanes(list(systems[first : first + LANES]))]
 
 
 def _run_lanes(systems: list[System]) -> list[Motion | None]:
@@ -138,23 +135,25 @@ def _exponents(sizes: Floats, duration: float) -> list[Exponent]:
 
 def shared(system: System) -> tuple[Shared, Floats, Floats]:
     """What a system has in common with others beside it, its table, and room for the gaps."""
-    made = new(SHARED)
+    made = new(Shared)
     values, table = _tables(system.half_length, system.shoe, system.wheel, system.nodes)
     values = values | {"h": system.step, "rate": 1.0 / system.step, "per_sample": system.per_sample}
     values |= {"nodes": system.nodes, "signals": np.frombuffer(stop.memory, np.uint8).ctypes.data}
     for name, value in values.items():
-        made[name] = value
+        setattr(made, name, value)
     return made, table, aligned(LANES * (system.nodes + 6)).reshape(-1, 2 * LANES)
 
 
-def filled(systems: Sequence[System]) -> Any:
+def filled(systems: Sequence[System]) -> Lane:
     """Systems in their lanes; one without a start, or that (13) contracts too little for, is out."""
-    columns = np.array([each.coefficients for each in systems]).T
+    columns = np.array([system.coefficients for system in systems]).T
     c = Coefficients(**dict(zip(Coefficients._fields, columns, strict=True)))
-    start, off = (np.array(each).T for each in zip(*map(_start, systems), strict=True))
+    start, off = (np.array(pairs).T for pairs in zip(*map(_start, systems), strict=True))
     h = systems[0].step
     wheel = systems[0].wheel
-    load, belt, k = np.array([(each.load_at_start, each.belt_speed, each.layer_stiffness) for each in systems]).T
+    load, belt, k = np.array(
+        [(system.load_at_start, system.belt_speed, system.layer_stiffness) for system in systems]
+    ).T
     side = np.sign(start[2] - belt)
     grip = -side * c.phi
     now = 1.0 - THETA_1
@@ -165,21 +164,21 @@ def filled(systems: Sequence[System]) -> Any:
     moves = np.abs(a_11 - a_12 * grip)  # y by the force, over a; then x by it, on the steepest slope
     moves += float(np.abs(wheel.g) @ wheel.omega) * np.abs(a_22 * grip - a_12)
     factor = 2.0 * THETA_1 * h * 2.0 * systems[0].half_length * k * moves / a  # whichever part touches
-    allowed = LEFT * np.array([each.method.tolerance for each in systems]) * np.abs(load)
-    o = aligned(LANE.itemsize // 8).view(LANE)[0]
+    allowed = LEFT * np.array([system.method.tolerance for system in systems]) * np.abs(load)
+    o: Lane = aligned(Lane.layout.itemsize // 8).view(Lane.layout)[0]
     values = {**c._asdict(), "belt": belt, "k": k, "side": side, "grip": grip}
     values |= {"i_11": a_22 / a, "i_12": -a_12 / a, "i_22": a_11 / a, "limit": allowed * (1.0 - factor) / factor}
     values["answer"] = 2.0 * THETA_1 * h * 2.0 * systems[0].half_length * k * (a_11 - a_12 * grip) / a
-    values |= {"at_x": start[0], "at_y": start[1], "alive": (factor < _CONTRACTION) & ~np.isnan(start[0])}
+    values |= {"at_x": start[0], "at_y": start[1], "alive": (factor < 0.1) & ~np.isnan(start[0])}  # of (13)
     for name, value in values.items():
-        o[name] = value
+        setattr(o, name, value)
     o.motion.x, o.motion.y, o.motion.d, o.motion.e = start
     for levels in o.motion, o.coarse:
         levels.source_x = -load * c.sin_beta
         levels.source_y = -load * c.cos_beta
     o.turns[: len(wheel.g)] = np.outer(wheel.turns, belt)
     error = o.by_steps
-    error.x, error.y = np.transpose([each.start_error or (0.0, 0.0) for each in systems])
+    error.x, error.y = np.transpose([system.start_error or (0.0, 0.0) for system in systems])
     error.x_old = error.x
     error.y_old = error.y
     nodes = o.by_nodes
@@ -188,11 +187,11 @@ def filled(systems: Sequence[System]) -> Any:
     return o
 
 
-def _seed(disturbed: Any, rate: Floats, h: float) -> None:
+def _seed(disturbed: Levels, rate: Floats, h: float) -> None:
     """Begin with disturbances as `tangent.seed` does; the forces of their first levels know nothing of them."""
     disturbed.x = disturbed.y = 0.5 / rate
-    disturbed.d = disturbed.d_old = 0.5
-    disturbed.e = disturbed.e_old = -0.5
+    disturbed.d[:] = disturbed.d_old[:] = 0.5
+    disturbed.e[:] = disturbed.e_old[:] = -0.5
     disturbed.x_old = disturbed.x - 0.5 * h
     disturbed.y_old = disturbed.y + 0.5 * h
 
@@ -203,7 +202,7 @@ def _start(system: System) -> tuple[Start, tuple[float, float]]:
     start = initial.x, initial.y, initial.vx, initial.vy
     if not initial.from_equilibrium:
         return start, (0.0, 0.0)
-    if (rest := sliding(system)) is None:
+    if (equilibrium := sliding(system)) is None:
         return (math.nan, math.nan, initial.vx, initial.vy), (0.0, 0.0)
-    off = (0.0, 0.0) if system.start_error is None else off_by_nodes(system, rest)
-    return (initial.x + rest.x, initial.y + rest.y, initial.vx, initial.vy), off
+    off = (0.0, 0.0) if system.start_error is None else off_by_nodes(system, equilibrium)
+    return (initial.x + equilibrium.x, initial.y + equilibrium.y, initial.vx, initial.vy), off

@@ -14,13 +14,13 @@ def minimise(
 
     a is positive definite and g0 = phi F_y >= 0. The sign is 0 in stick, where d is U exactly.
     """
-    part = 1.0 / (a_11 * a_22 - a_12 * a_12)  # known before g_1 and g_2 are: no step waits for it
-    free = (g_1 * a_22 - g_2 * a_12) * part
-    bound = g_0 * a_22 * part
+    inverse = 1.0 / (a_11 * a_22 - a_12 * a_12)  # known before g_1 and g_2 are: no step waits for it
+    free = (g_1 * a_22 - g_2 * a_12) * inverse
+    bound = g_0 * a_22 * inverse
     if free - bound > belt:  # Eq. (15)
-        return free - bound, (g_2 * a_11 - g_1 * a_12 + g_0 * a_12) * part, 1.0
+        return free - bound, (g_2 * a_11 - g_1 * a_12 + g_0 * a_12) * inverse, 1.0
     if free + bound < belt:  # Eq. (16)
-        return free + bound, (g_2 * a_11 - g_1 * a_12 - g_0 * a_12) * part, -1.0
+        return free + bound, (g_2 * a_11 - g_1 * a_12 - g_0 * a_12) * inverse, -1.0
     return belt, (g_2 - a_12 * belt) / a_22, 0.0  # Eq. (17)
 
 
@@ -29,8 +29,8 @@ def slopes(a_11: float, a_12: float, a_22: float, phi: float, side: float) -> tu
     """Derivatives of d and e, (15)-(17), by the normal force F (g2 grows with F, g0 with phi F), on a `side`."""
     if side == 0.0:
         return 0.0, 1.0 / a_22
-    part = 1.0 / (a_11 * a_22 - a_12 * a_12)
-    return (-a_12 - side * phi * a_22) * part, (a_11 + side * phi * a_12) * part
+    inverse = 1.0 / (a_11 * a_22 - a_12 * a_12)
+    return (-a_12 - side * phi * a_22) * inverse, (a_11 + side * phi * a_12) * inverse
 
 
 @kernel

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from brakecli.solver.quantities import HISTORY
 
 ROW_BYTES = 8 * len(HISTORY) + 1  # of a stored sample: the time, the variables, and the state in one byte
-_PLACES = {name: place for place, name in enumerate(HISTORY)}
+_COLUMNS = {name: column for column, name in enumerate(HISTORY)}
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class History:
 
 def array_history(interval: float, rows: NDArray[np.float64]) -> History:
     """A history in memory: rows of `quantities.HISTORY`."""
-    return History(interval, len(rows), lambda name, start, stop: rows[start:stop, _PLACES[name]])
+    return History(interval, len(rows), lambda name, start, stop: rows[start:stop, _COLUMNS[name]])
 
 
 def stacked(histories: Sequence[History]) -> History:
@@ -34,10 +34,10 @@ def stacked(histories: Sequence[History]) -> History:
     samples = histories[0].samples
     read = histories[0].read
     if len(histories) == 1:  # which may be too long for memory
-        return History(interval, samples, lambda *given: read(*given)[None])
+        return History(interval, samples, lambda *piece: read(*piece)[None])
 
     @cache
     def column(name: str) -> NDArray[np.float64]:
-        return np.array([each.read(name, 0, samples) for each in histories])
+        return np.array([history.read(name, 0, samples) for history in histories])
 
     return History(interval, samples, lambda name, start, stop: column(name)[:, start:stop])

@@ -4,7 +4,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -16,9 +16,9 @@ from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.energy import OPEN_ACCOUNT, EnergyAccount, account
 from brakecli.solver.friction import minimise
 from brakecli.solver.method import Method
-from brakecli.solver.plant import PLANT
+from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import HISTORY, Failure
-from brakecli.solver.records import COEFFICIENTS, EVENT, GRID, MOST_EVENTS, WEIGHTS, Pair, filled, one
+from brakecli.solver.records import EVENT, MOST_EVENTS, Drive, Pair, one
 from brakecli.solver.roughness import turn_wheel
 from brakecli.solver.schedules import Schedule, integral_at, slope_at
 from brakecli.solver.steady_sliding import off_by_nodes, steady_sliding
@@ -32,11 +32,7 @@ EVENTS = 1000
 """How many unconverged steps are kept with their time and residual; all are counted."""
 BLOCK_SECONDS = 0.1
 """Time that one call of the compiled loop should take: between calls Ctrl-C is heard and progress is reported."""
-MOST_GROWTH = 10.0
-"""Largest block over the one before, whose time may have been chance."""
 BLOCK_ROWS = 16384
-EXACT_BLOCK = 16384
-"""Steps in the first block of a scheme whose steps are exact: each costs far below a microsecond."""
 
 Sink = Callable[[Floats], None]
 Progress = Callable[[int], None]
@@ -133,19 +129,20 @@ class Stepping:
         self.work = Work()
         self.events = np.zeros((EVENTS, 2))
         drive = system.belt, system.load
-        self._kept = EVENT * MOST_EVENTS if system.tracked else 0
-        room = sum(map(len, drive)) + self._kept
+        self._event_room = EVENT * MOST_EVENTS if system.tracked else 0
+        room = sum(map(len, drive)) + self._event_room
         self.contact = build_layer(system.evaluator, system.pad, moving=True, room=room)
-        plants = one(PLANT)
-        self.plant = plant = plants[0]
-        plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
-        plant.s = filled(WEIGHTS, system.weights._asdict())
-        plant.grid = filled(GRID, system.grid)
+        plants = one(Plant)
+        self.plant: Plant = plants[0]
+        plant = self.plant
+        plant.c = system.coefficients
+        plant.s = system.weights
+        plant.grid = system.grid
         plant.layer = self.contact.layer
-        self._place(plant.drive, *drive)
+        self._put_schedules(plant.drive, *drive)
         self._arrays = plants, self.contact.tables, self.contact.scratch
         self._layer = plant.layer, self.contact.tables, self.contact.scratch
-        self.state = plant[self.scheme.KEPT]
+        self.state = getattr(plant, self.scheme.KEPT)
         self._advance = getattr(self.scheme, "advance", advance)
         self.counts = plant.counts
         self.counts.level = self.scheme.LAG
@@ -174,17 +171,18 @@ class Stepping:
         self.system.refuse_steps(0.0 if sink else 8.0 * len(HISTORY) * self.system.samples)
         lag = self.scheme.LAG
         work = self.work
-        kept = [np.zeros((0, len(HISTORY)))]
-        sink = sink or kept.append
+        blocks = [np.zeros((0, len(HISTORY)))]
+        sink = sink or blocks.append
         last = self.system.steps + lag
         most = BLOCK_ROWS * self.system.per_sample
-        size = min(EXACT_BLOCK if self.system.method.row.exact else first_block, most)
+        size = min(16384 if self.system.method.row.exact else first_block, most)  # exact steps are far below a µs
         while not work.failed and self.counts.level < last:
             start = time.perf_counter()
             rows = self.block(min(last, int(self.counts.level) + size))
             seconds = time.perf_counter() - start
             work.solve_seconds += seconds
-            size = min(int(size * min(MOST_GROWTH, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, most)
+            # no block is more than ten times as large as the one before, whose time may have been chance
+            size = min(int(size * min(10.0, BLOCK_SECONDS / max(seconds, 1e-9))) + 1, most)
             check_signals()
             sink(rows)
             progress(int(self.counts.level) - lag)
@@ -199,7 +197,7 @@ class Stepping:
         if not work.failed and not abs(energy.relative_closing_error) <= OPEN_ACCOUNT:
             work.failure = Failure.UNBALANCED
         carried = self._carries and not work.failed and self.system.samples >= FEWEST_SAMPLES
-        found = exponents(self.tangent.logs[:, None], self.system.sampled_duration)[0] if carried else None
+        exponent = exponents(self.tangent.logs[:, None], self.system.sampled_duration)[0] if carried else None
         track = None
         if self.system.tracked:
             track = tracked(
@@ -218,7 +216,7 @@ class Stepping:
                 else None
             )
             own = OwnError(self.tangent.worst.copy(), float(self.tangent.unsure), grown)
-        return Motion(self.system, np.concatenate(kept), work, energy, found, track, own)
+        return Motion(self.system, np.concatenate(blocks), work, energy, exponent, track, own)
 
     def block(self, stop: int) -> Floats:
         """Step to level `stop`, or to the next sample where steps are the scheme's own; the samples on the way."""
@@ -237,10 +235,10 @@ class Stepping:
             done += 1  # the sample of the failing step's own level has been taken
         return rows if done == stop - lag else rows[: -(-done // per_sample) + (-first // per_sample)]
 
-    def _place(self, drive: Any, belt: Schedule, load: Schedule) -> None:
+    def _put_schedules(self, drive: Drive, belt: Schedule, load: Schedule) -> None:
         """Put the knots of speed and load behind what the contact takes of the scratch; events follow them."""
         scratch = self.contact.scratch
-        drive.load_end = len(scratch) - self._kept
+        drive.load_end = len(scratch) - self._event_room
         drive.belt_end = drive.load_at = drive.load_end - len(load)
         drive.belt_at = drive.belt_end - len(belt)
         scratch[drive.belt_at : drive.belt_end] = belt
@@ -262,28 +260,28 @@ class Stepping:
         x = initial.x
         y = initial.y
         if initial.from_equilibrium:
-            rest = steady_sliding(system)
-            x = x + rest.x
-            y = y + rest.y
+            equilibrium = steady_sliding(system)
+            x = x + equilibrium.x
+            y = y + equilibrium.y
             if system.start_error is not None:
-                self._off = off_by_nodes(system, rest)
+                self._off = off_by_nodes(system, equilibrium)
         self._evaluate_at(x, y, 0.0)
         velocity = (initial.vx, initial.vy)
         acceleration = (0.0, 0.0)
-        found = plant.layer.contact
+        at_start = plant.layer.contact
         if system.method.start == "consistent":
-            acceleration = _acceleration(system, (x, y), velocity, found.normal_force)
+            acceleration = _acceleration(system, (x, y), velocity, at_start.normal_force)
         self.scheme.begin(plant.s, self.state, (x, y), velocity, acceleration)
-        self.state.force = plant.work.force_before = found.normal_force
+        self.state.force = plant.work.force_before = at_start.normal_force
         if not system.method.own_steps:
-            self.state.force_before = self.state.force_earlier = found.normal_force
-        plant.work.store_x_before = found.store_x
+            self.state.force_before = self.state.force_earlier = at_start.normal_force
+        plant.work.store_x_before = at_start.store_x
 
     def _evaluate_at(self, x: float, y: float, steps: float) -> None:
         """Evaluate the contact, `steps` steps after t = 0."""
-        samples, part = divmod(steps, self.system.per_sample)
+        samples, beyond = divmod(steps, self.system.per_sample)
         t = samples * self.system.interval
-        travel, travel_low = integral_at(self.system.belt, t, part * self.system.step)
+        travel, travel_low = integral_at(self.system.belt, t, beyond * self.system.step)
         turn_wheel(travel, travel_low, *self._layer)
         fill(x, y, *self._layer)
 

@@ -13,26 +13,28 @@ from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from threading import RLock
-from typing import Any, Generic, ParamSpec, TypeVar, overload
-
-import numpy as np
+from types import ModuleType
+from typing import Generic, ParamSpec, TypeVar, overload
 
 from brakecli.solver import beforehand, cache_folder, compiling
+from brakecli.solver.records import Record
 
 FAST = frozenset({"reassoc", "contract", "nsz"})
 """What fast loops allow: sums in any order, fused multiply-add, no signed zeros; NaN stays NaN."""
 
 P = ParamSpec("P")
-R = TypeVar("R")
-F = TypeVar("F", bound=Callable[..., Any])
+R = TypeVar("R", covariant=True)
+F = TypeVar("F", bound=Callable[..., object])
+Argument = type[float] | type[int] | type[Record] | list[type[Record]] | int | None
+"""A type in the signature of an entry, see `entry`."""
 INTERPRETED = (os.environ.get("NUMBA_DISABLE_JIT") or "0") != "0"
 """Whether all kernels are interpreted."""
-entries: list[Any] = []
+entries: list["Entry[..., object]"] = []
 """Every entry of this process, in the order of their definition."""
 
 _locks = [RLock()]  # the last one is that of loading; a forked process gets another: nobody there lets go of ours
 os.register_at_fork(after_in_child=lambda: _locks.append(RLock()))
-_unknown: list[tuple[Any, dict[str, Any]]] = []  # kernels that the compiler has not heard of, with their options
+_unknown: list[tuple[Callable[..., object], dict[str, object]]] = []  # kernels that the compiler has not heard of
 _DECIDING = (
     "NUMBA_CPU_NAME",
     "NUMBA_CPU_FEATURES",
@@ -49,7 +51,9 @@ _DECIDING = (
 def kernel(function: F, /) -> F: ...
 @overload
 def kernel(*, fastmath: frozenset[str] = ..., inline: bool = ...) -> Callable[[F], F]: ...
-def kernel(function: Any = None, /, *, fastmath: frozenset[str] = frozenset(), inline: bool = True) -> Any:
+def kernel(
+    function: F | None = None, /, *, fastmath: frozenset[str] = frozenset(), inline: bool = True
+) -> F | Callable[[F], F]:
     """A function for kernels, strict (no fastmath unless named). Called from Python, it is interpreted.
 
     A large one, or one that is called in many places, is better not `inline`: its callers would take longer to
@@ -66,7 +70,7 @@ def kernel(function: Any = None, /, *, fastmath: frozenset[str] = frozenset(), i
 class Entry(Generic[P, R]):
     """A kernel that Python calls: its first call loads it from the cache, which holds all of them by then."""
 
-    def __init__(self, function: Callable[P, R], types: tuple[Any, ...]) -> None:
+    def __init__(self, function: Callable[P, R], types: tuple[Argument, ...]) -> None:
         """From what is compiled, and the types of its result and of its arguments."""
         self.function = function
         self.types = types
@@ -87,27 +91,27 @@ class Entry(Generic[P, R]):
     @property
     def folder(self) -> Path | None:
         """Where its machine code is kept, if it can be."""
-        found = folder()
-        return found / self.name if found else None
+        whole = folder()
+        return whole / self.name if whole else None
 
 
-def entry(*types: Any) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def entry(*types: Argument) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A kernel that Python calls, with the type of its result and those of its arguments.
 
     A type is None, float, int, that of a record, [that of a record] for an array of one, or the dimensions of an
     array of doubles. A call takes 40 µs to see what a large record is, and 1 µs with an array of it.
     """
 
-    def made(function: Callable[P, R]) -> Callable[P, R]:
+    def register(function: Callable[P, R]) -> Callable[P, R]:
         if INTERPRETED:
             return function
-        entries.append(Entry(function, types))
-        return entries[-1]  # type: ignore[no-any-return]
+        entries.append(made := Entry(function, types))
+        return made
 
-    return made
+    return register
 
 
-def load(function: Any) -> Any:
+def load(function: Callable[P, R]) -> Callable[P, R]:
     """The compiled function of an entry; one that is interpreted is taken as it is."""
     return function.load() if isinstance(function, Entry) else function
 
@@ -119,7 +123,7 @@ def folder() -> Path | None:
 
 
 @cache
-def _numba() -> Any:
+def _numba() -> ModuleType:
     """Numba. It optimises as it does for `beforehand`, which takes a tenth less memory than its default."""
     os.environ.setdefault("NUMBA_OPT", beforehand.OPTIMISATION)
     import numba
@@ -143,59 +147,59 @@ def _facts() -> dict[str, str]:
     }
 
 
-def _loaded(each: Entry[P, R]) -> Callable[P, R]:
+def _loaded(own: Entry[P, R]) -> Callable[P, R]:
     """An entry from the cache, which then holds all of them, or compiled where there is none."""
-    place = each.folder
-    if place is not None and _prepare() and not beforehand.is_sound(place):
+    machine_code = own.folder
+    if machine_code is not None and _prepare() and not beforehand.is_sound(machine_code):
         _mend()
-    sound = place is not None and beforehand.is_sound(place) and beforehand.is_ours(place)
+    sound = machine_code is not None and beforehand.is_sound(machine_code) and beforehand.is_ours(machine_code)
     if not sound:
         compiling.begins()
-        place = place and beforehand.emptied(place)
+        machine_code = machine_code and beforehand.emptied(machine_code)
     numba = compiler()
-    signature = _type(numba, each.types[0])(*(_type(numba, type_) for type_ in each.types[1:]))
+    signature = _type(numba, own.types[0])(*(_type(numba, type_) for type_ in own.types[1:]))
     before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(place)
+    numba.config.CACHE_DIR = str(machine_code)
     try:
         with compiling.without_blas():
-            compiled = numba.njit(signature, cache=place is not None, _nrt=False)(each.function)
-        if place is not None and not sound:
+            compiled = numba.njit(signature, cache=machine_code is not None, _nrt=False)(own.function)
+        if machine_code is not None and not sound:
             with suppress(OSError):  # the next process compiles it again
-                beforehand.vouch(place)
+                beforehand.vouch(machine_code)
     except Exception:  # the cache cannot be read or written after all, as on a full disk: do without
-        compiled = numba.njit(signature, _nrt=False)(each.function)
+        compiled = numba.njit(signature, _nrt=False)(own.function)
     finally:
         numba.config.CACHE_DIR = before
     return compiled  # type: ignore[no-any-return]
 
 
-def _type(numba: Any, type_: Any) -> Any:
+def _type(numba: ModuleType, type_: Argument) -> Callable[..., object]:
     """The compiler's word for a type in the signature of an entry."""
     if isinstance(type_, list):
-        return numba.types.Array(numba.from_dtype(type_[0]), 1, "C")
-    if isinstance(type_, np.dtype):
-        return numba.from_dtype(type_)
+        return numba.types.Array(numba.from_dtype(type_[0].layout), 1, "C")  # type: ignore[no-any-return]
     if isinstance(type_, int):
-        return numba.types.Array(numba.float64, type_, "C")
-    return {None: numba.void, int: numba.int64, float: numba.float64}[type_]
+        return numba.types.Array(numba.float64, type_, "C")  # type: ignore[no-any-return]
+    if isinstance(type_, type) and issubclass(type_, Record):
+        return numba.from_dtype(type_.layout)  # type: ignore[no-any-return]
+    return {None: numba.void, int: numba.int64, float: numba.float64}[type_]  # type: ignore[no-any-return]
 
 
 @cache
 def _prepare() -> bool:
     """See to it once that the cache holds all entries; whether it does. What keeps it from that is told."""
-    place = folder()
-    assert place is not None
-    if why := beforehand.prepare(place, _facts()):
+    whole = folder()
+    assert whole is not None
+    if why := beforehand.prepare(whole, _facts()):
         compiling.warn(why)
     return not why and not beforehand.is_lazy() and not beforehand.is_child()
 
 
 def _mend() -> None:
     """Have all entries of a damaged cache compiled anew."""
-    place = folder()
-    assert place is not None
+    whole = folder()
+    assert whole is not None
     try:
-        beforehand.forget(place)
+        beforehand.forget(whole)
     except OSError as error:
         why = f"{(error.strerror or str(error)).lower()} (found {error.filename})"
         what = f"the cache of compiled kernels is damaged, and cannot be mended: {why}"
@@ -205,7 +209,7 @@ def _mend() -> None:
         _prepare()
 
 
-def compiler() -> Any:
+def compiler() -> ModuleType:
     """Numba, which knows all kernels that have been imported."""
     numba = _compiler()
     while _unknown:
@@ -216,7 +220,7 @@ def compiler() -> Any:
 
 
 @cache
-def _compiler() -> Any:
+def _compiler() -> ModuleType:
     """Numba, which knows how to read the byte of a signal."""
     numba = _numba()
     from llvmlite import ir
@@ -224,17 +228,19 @@ def _compiler() -> Any:
     from numba.extending import overload as overload_of
 
     @intrinsic
-    def byte_at(typing: Any, address: Any) -> Any:
+    def byte_at(typing: object, address: object) -> tuple[object, object]:
         """The byte at an address, read anew each time."""
 
-        def codegen(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-            place = builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
-            return builder.zext(builder.load_atomic(place, "monotonic", 1), ir.IntType(64))
+        def codegen(
+            context: object, builder: ir.IRBuilder, signature: object, arguments: list[ir.Value]
+        ) -> ir.Value:
+            pointer = builder.inttoptr(arguments[0], ir.IntType(8).as_pointer())
+            return builder.zext(builder.load_atomic(pointer, "monotonic", 1), ir.IntType(64))
 
         return numba.int64(numba.int64), codegen
 
     @overload_of(_first_byte, strict=False)
-    def compiled(address: Any) -> Any:
+    def compiled(address: object) -> Callable[[object], object]:
         return lambda address: byte_at(address)  # type: ignore[call-arg]  # the compiler gives the first
 
     return numba

@@ -1,7 +1,6 @@
 """What schemes have in common that find their steps themselves."""
 
-from typing import Any
-
+from brakecli.solver.block import Block
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.records import Pair, Weights
 
@@ -16,7 +15,7 @@ def weighted_time(s: Weights) -> float:
     return 0.0
 
 
-def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
+def begin(s: Weights, state: Block, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     """The initial state; its phase is found with the first step."""
     state.x, state.y = position
     state.v_x, state.v_y = velocity

@@ -6,8 +6,6 @@ from fractions import Fraction
 from brakecli.solver.system import System
 
 LONGEST = 10.0  # s, of a period that is worth computing
-LARGEST_DENOMINATOR = 10**6  # of the ratio of two wavelengths
-SAME = 1e-15  # relative difference of ratios that are the same but for rounding
 
 
 def common_period(system: System) -> float | None:
@@ -16,9 +14,9 @@ def common_period(system: System) -> float | None:
     belt = abs(system.belt_speed)
     if belt == 0.0 or not turns.size:
         return None
-    ratios = [Fraction(turn / turns[0]).limit_denominator(LARGEST_DENOMINATOR) for turn in turns.tolist()]
-    if any(abs(float(ratio) * turns[0] - turn) > SAME * turn for ratio, turn in zip(ratios, turns, strict=True)):
+    ratios = [Fraction(turn / turns[0]).limit_denominator(10**6) for turn in turns.tolist()]
+    if any(abs(float(ratio) * turns[0] - turn) > 1e-15 * turn for ratio, turn in zip(ratios, turns, strict=True)):
         return None
-    common = math.gcd(*(each.numerator for each in ratios)) / math.lcm(*(each.denominator for each in ratios))
+    common = math.gcd(*(ratio.numerator for ratio in ratios)) / math.lcm(*(ratio.denominator for ratio in ratios))
     period = 1.0 / (turns[0] * common * belt) if common > 0.0 else math.inf
     return float(period) if period <= LONGEST else None

@@ -12,23 +12,16 @@ from brakecli.solver.kernels import kernel
 
 BACKWARD, STICK, FORWARD, OPEN = range(4)
 """The phases: the sign of the sliding velocity plus one, and flight."""
-HEIGHT = 0
-SLIDING = 1
-PULL = 1
-PUSH = 2
+HEIGHT, PULL, PUSH = range(3)
+SLIDING = PULL
 """The margins. Of each phase: how far the pad is from being clear, or is clear (m). Of slip: the sliding speed
 (m/s). Of stick: how far the force that it takes is within the friction cone (N), on the side where friction would
 have to pull harder, so that backward slip follows, and on the side where it would have to push."""
 UNDECIDED = -1
-"""Not a phase: the shoe touches at the velocity of the wheel, and the forces decide (`held`)."""
+"""Not a phase: the shoe touches at the velocity of the wheel, and the forces decide (`stick_or_slip`)."""
 
-CONE = 1.0 + 1e-12
-"""The friction cone over itself, by whose rounding a shoe still sticks."""
 SOONER = 0.125
 """Part of a time in which a margin that begins at zero is sought above it, and of that part, and so on."""
-
-_MOST_EVENTS = 1000
-_NO_PROGRESS = 1e-6
 
 
 @kernel
@@ -46,7 +39,7 @@ def sliding_phase(velocity: float) -> int:
 
 
 @kernel
-def held(pull: float, push: float, pull_rounding: float, push_rounding: float) -> int:
+def stick_or_slip(pull: float, push: float, pull_rounding: float, push_rounding: float) -> int:
     """The phase of a touching shoe at the wheel's velocity, by its margins in stick, Eqs. (3)-(5).
 
     `pull` is φ F_y - needed and `push` φ F_y + needed. It sticks if friction can hold it, up to rounding.
@@ -83,10 +76,10 @@ def carried(anchor: float, anchor_low: float, travel: float, travel_low: float) 
 @kernel
 def counted(since: float, events: int, time: float, step: float) -> tuple[float, int]:
     """Since when events are counted, and how many there are, after one more: those within 1e-6 of a step."""
-    return (time, 1) if time - since > _NO_PROGRESS * step else (since, events + 1)
+    return (time, 1) if time - since > 1e-6 * step else (since, events + 1)
 
 
 @kernel
 def stalled(events: int) -> bool:
     """Whether so many events came without progress that they will never end."""
-    return events > _MOST_EVENTS
+    return events > 1000

@@ -10,7 +10,7 @@ import numpy as np
 from brakecli.solver.arrays import VECTOR, Floats
 from brakecli.solver.double_double import multiply, split, two_product
 from brakecli.solver.kernels import entry, kernel
-from brakecli.solver.records import LAYER, Layer
+from brakecli.solver.records import Layer
 
 PI = Fraction(314159265358979323846264338327950288419716939937511, 10**50)
 TWO_PI = 2.0 * math.pi
@@ -38,7 +38,7 @@ class Surface(NamedTuple):
 
     @property
     def _bytes(self) -> tuple[bytes, ...]:
-        return tuple(each.tobytes() for each in self)
+        return tuple(numbers.tobytes() for numbers in self)
 
     @property
     def waves(self) -> Floats:
@@ -117,7 +117,7 @@ def turn(travel: float, travel_low: float, layer: Layer, tables: Floats, scratch
     window = layer.window
     at = layer.pad.turns_at
     n = layer.pad.wheel_terms
-    layer.known = 0
+    layer.level = 0
     if window.rows == 0:
         angles = scratch[layer.angles_at : layer.angles_at + n]
         turn_to(tables[at : at + 3 * n], travel, travel_low, angles)
@@ -128,5 +128,5 @@ def turn(travel: float, travel_low: float, layer: Layer, tables: Floats, scratch
     window.travel = (travel - grid) + (travel_low - grid_low)
 
 
-turn_wheel = entry(None, float, float, LAYER, VECTOR, VECTOR)(turn)
+turn_wheel = entry(None, float, float, Layer, VECTOR, VECTOR)(turn)
 """`turn`, for Python."""

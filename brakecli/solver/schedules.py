@@ -35,7 +35,7 @@ def schedule(times: Sequence[float], values: Sequence[float], scale: float = 1.0
     at_zero = integrals[k] - (v[k] - (slopes[k] if t[k] <= 0 else 0) * t[k] / 2) * t[k]
     columns = [v, slopes, [integral - at_zero for integral in integrals]]
     pairs = [[split(value) for value in column] for column in columns]
-    return np.array([(float(time), *chain(*rest)) for time, *rest in zip(t, *pairs, strict=True)]).ravel()
+    return np.array([(float(time), *chain(*parts)) for time, *parts in zip(t, *pairs, strict=True)]).ravel()
 
 
 def knots(s: Schedule) -> int:
@@ -102,5 +102,5 @@ def integral_at(s: Schedule, t: float, t_low: float) -> tuple[float, float]:
     after, after_low = add(after, after_low, t_low, 0.0)
     mean, mean_low = multiply(after, after_low, 0.5 * slope, 0.5 * slope_low)
     mean, mean_low = add(mean, mean_low, s[KNOT * k + VALUE], s[KNOT * k + VALUE_LOW])
-    part, part_low = multiply(after, after_low, mean, mean_low)
-    return add(part, part_low, s[KNOT * k + INTEGRAL], s[KNOT * k + INTEGRAL_LOW])
+    gain, gain_low = multiply(after, after_low, mean, mean_low)
+    return add(gain, gain_low, s[KNOT * k + INTEGRAL], s[KNOT * k + INTEGRAL_LOW])

@@ -26,10 +26,13 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Protocol, cast, runtime_checkable
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     from brakecli.solver.arrays import Floats
     from brakecli.solver.coefficients import Coefficients
     from brakecli.solver.energy import Mechanical
-    from brakecli.solver.records import Pair, Weights
+    from brakecli.solver.plant import Plant
+    from brakecli.solver.records import Contact, Pair, Problem, Record, State, Weights, Works
 
 HALF: tuple[float, ...] = 0.5, 0.5
 QUARTERS: tuple[float, ...] = 0.25, 0.5, 0.25
@@ -40,7 +43,7 @@ NUMEROV: tuple[float, ...] = 1 / 12, 10 / 12, 1 / 12
 class SchemeModule(Protocol):
     """What every scheme has."""
 
-    STATE: Any
+    STATE: "type[Record]"
     """Type of the record that its motion is kept in, with the fields x, y, v_x, v_y and force."""
     KEPT: str
     """The field of the plant that is this record."""
@@ -71,11 +74,20 @@ class SchemeModule(Protocol):
 class SteppingModule(SchemeModule, Protocol):
     """What a scheme has besides whose steps are of one length: two kernels, with branches in `steps.step`."""
 
-    def prepare(self, c: "Coefficients", s: "Weights", state: Any, problem: Any, /) -> None:
+    STATE: "type[State]"
+
+    def prepare(self, c: "Coefficients", s: "Weights", state: "State", problem: "Problem", /) -> None:
         """The minimisation that a step comes down to."""
 
     def finish(
-        self, c: "Coefficients", s: "Weights", state: Any, problem: Any, contact: Any, work: Any, /
+        self,
+        c: "Coefficients",
+        s: "Weights",
+        state: "State",
+        problem: "Problem",
+        contact: "Contact",
+        work: "Works",
+        /,
     ) -> None:
         """The new state, and the works of the step."""
 
@@ -85,7 +97,14 @@ class OwnStepsModule(SchemeModule, Protocol):
     """What a scheme has besides that finds its steps itself. Its samples lie on the grid alone."""
 
     def advance(
-        self, plants: Any, tables: "Floats", scratch: "Floats", rows: "Floats", events: "Floats", stop: int, /
+        self,
+        plants: "Sequence[Plant]",
+        tables: "Floats",
+        scratch: "Floats",
+        rows: "Floats",
+        events: "Floats",
+        stop: int,
+        /,
     ) -> int:
         """Step to the level `stop`, fill rows with the samples before each step; a `Failure`: an entry."""
 

@@ -8,10 +8,6 @@ import numpy as np
 from brakecli.solver.kernels import kernel
 
 _ROUND = 6755399441055744.0  # 1.5 * 2^52: a sum with it is rounded to a whole number
-_QUARTERS = 0.6366197723675814  # 2/pi
-# pi/2; the first has 33 bits
-_QUARTER = 1.57079632673412561417
-_QUARTER_LOW = 6.07710050650619224932e-11
 
 
 @kernel
@@ -20,8 +16,9 @@ def sine_cosine(psi: float) -> tuple[float, float]:
 
     The compiler turns its branches into choices, so that a loop takes several at a time.
     """
-    n = (psi * _QUARTERS + _ROUND) - _ROUND
-    r = (psi - n * _QUARTER) - n * _QUARTER_LOW
+    n = (psi * 0.6366197723675814 + _ROUND) - _ROUND
+    # pi/2 in two numbers, of which the first has 33 bits
+    r = (psi - n * 1.57079632673412561417) - n * 6.07710050650619224932e-11
     z = r * r
     s = -2.50507602534068634195e-08 + z * 1.58969099521155010221e-10
     s = 8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + z * s))

@@ -14,7 +14,7 @@ from brakecli.solver.contact.closed_form import CLEAR, FULL, coverage
 from brakecli.solver.contact.force import evaluate
 from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.kernels import entry
-from brakecli.solver.records import LAYER, Layer
+from brakecli.solver.records import Layer
 from brakecli.solver.roughness import turn
 from brakecli.solver.system import MOST_TABLE_BYTES, System
 
@@ -22,11 +22,7 @@ WINDOWS = 4
 """Stretches of the wheel of which each has an average of its own: by their differences the error is known."""
 PLACES = 1024
 """Positions of the wheel that an average takes, in all stretches, each as long as 50 of its longest waves."""
-_LONGEST = 50.0
 TABLE = 129
-# errors of y: over the roughness, and over itself; a few units of rounding
-_HEIGHT = 1e-15
-_RELATIVE = 1e-14
 PRESSED = 1e-6
 """Least normal force of a pressed shoe, as a part of the load. Below it the force is a difference of numbers that
 are a million times as large, and a small change of any of them lifts the shoe off."""
@@ -53,7 +49,7 @@ class SteadySliding:
         return self.normal_force > PRESSED * abs(load)
 
 
-@entry(None, float, VECTOR, VECTOR, LAYER, VECTOR, VECTOR, VECTOR)
+@entry(None, float, VECTOR, VECTOR, Layer, VECTOR, VECTOR, VECTOR)
 def add_places(
     y: float, places: Floats, weights: Floats, layer: Layer, tables: Floats, scratch: Floats, sums: Floats
 ) -> None:
@@ -67,7 +63,7 @@ def add_places(
         sums[2] += weights[i] * contact.fraction
 
 
-@entry(None, VECTOR, VECTOR, LAYER, VECTOR, VECTOR, VECTOR)
+@entry(None, VECTOR, VECTOR, Layer, VECTOR, VECTOR, VECTOR)
 def forces_along(
     heights: Floats, places: Floats, layer: Layer, tables: Floats, scratch: Floats, forces: Floats
 ) -> None:
@@ -80,7 +76,7 @@ def forces_along(
 
 def averaged_length(system: System) -> float:
     """Travel of the wheel (m) that an average is taken over."""
-    return WINDOWS * _LONGEST / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0
+    return WINDOWS * 50.0 / float(system.wheel.turns.min()) if len(system.wheel.g) else 0.0
 
 
 def fills_window(system: System) -> bool:
@@ -104,18 +100,18 @@ def mean_contacts(system: System, y: float) -> Floats:
         return np.zeros((WINDOWS, 3))
     if covered == FULL:
         return np.tile([-pad.k * length * (y + pad.shoe_mean), pad.k * length, 1.0], (WINDOWS, 1))
-    found = np.zeros((WINDOWS, 3))
+    sums = np.zeros((WINDOWS, 3))
     layer = build_layer(system.evaluator, system.pad, moving=fills_window(system))
     if wheel.g.size == 0:
-        add_places(y, np.zeros(1), np.ones(1), *layer, found[0])
-        return np.tile(found[0], (WINDOWS, 1))
+        add_places(y, np.zeros(1), np.ones(1), *layer, sums[0])
+        return np.tile(sums[0], (WINDOWS, 1))
     window = averaged_length(system) / WINDOWS
-    each = PLACES // WINDOWS
+    count = PLACES // WINDOWS
     for k in range(WINDOWS):
-        parts = (np.arange(each) + (k + 0.5) / WINDOWS) / each
+        parts = (np.arange(count) + (k + 0.5) / WINDOWS) / count
         weights = 2.0 * np.sin(np.pi * parts) ** 2
-        add_places(y, window * (parts + k - WINDOWS // 2), weights / each, *layer, found[k])
-    return found
+        add_places(y, window * (parts + k - WINDOWS // 2), weights / count, *layer, sums[k])
+    return sums
 
 
 def mean_contact(system: System, y: float) -> tuple[float, float, float]:
@@ -150,8 +146,8 @@ def _interpolated(surfaces: _Surfaces, window: int | None) -> tuple[Any, Any, An
     """
     from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
 
-    heights, each = _table(surfaces)
-    values = each.mean(axis=1) if window is None else each[:, window]
+    heights, by_window = _table(surfaces)
+    values = by_window.mean(axis=1) if window is None else by_window[:, window]
     force = CubicHermiteSpline(heights, values[:, 0], -values[:, 1])
     return force, force.derivative(), PchipInterpolator(heights, values[:, 2])
 
@@ -165,7 +161,7 @@ def tabulated(system: System, window: int | None = None) -> Mean:
     pad = system.pad.constants
     full = float(pad.full_up_to)
     top = float(pad.clear_from)
-    profiles = [each.tobytes() for profile in (system.shoe, system.wheel) for each in profile]
+    profiles = [numbers.tobytes() for profile in (system.shoe, system.wheel) for numbers in profile]
     surfaces = _Surfaces((system.half_length, system.evaluator, system.nodes, *profiles), system)
     k = system.layer_stiffness
 
@@ -219,7 +215,8 @@ def steady_sliding(
         elif unbalanced(full) < 0.0:
             from scipy.optimize import brentq  # only pads that open wait for it
 
-            y = brentq(unbalanced, full, top, xtol=_HEIGHT * max(abs(full), abs(top), 1e-300), rtol=_RELATIVE)
+            # to a few units of rounding, of the roughness and of y
+            y = brentq(unbalanced, full, top, xtol=1e-15 * max(abs(full), abs(top), 1e-300), rtol=1e-14)
         else:
             raise _none("the friction force lifts more than the load presses (self-locking)")
     force, stiffness, fraction = mean(float(y))
@@ -242,7 +239,7 @@ def finer(system: System) -> System:
     return twice if twice.table_bytes <= MOST_TABLE_BYTES else system.by(evaluator="exact")
 
 
-def off_by_nodes(system: System, rest: SteadySliding) -> tuple[float, float]:
+def off_by_nodes(system: System, equilibrium: SteadySliding) -> tuple[float, float]:
     """How far x and y (m) of steady sliding by nodes lie off those of the exact contact.
 
     What the force F lacks is told by twice as many cells, whose error is an eighth of that of cells, and less of
@@ -251,12 +248,12 @@ def off_by_nodes(system: System, rest: SteadySliding) -> tuple[float, float]:
     c = system.coefficients
     if not system.nodes or c.c_xx == 0.0:
         return 0.0, 0.0
-    lacks = mean_contact(finer(system), rest.y)[0] - rest.normal_force
+    lacks = mean_contact(finer(system), equilibrium.y)[0] - equilibrium.normal_force
     lean = c.c_xy / c.c_xx
     grip = c.grip(system.belt_speed)
     uplift = 1.0 - lean * grip
-    y = uplift * lacks / (c.c_yy - lean * c.c_xy + uplift * rest.stiffness)
-    x = grip * (lacks - rest.stiffness * y) / c.c_xx - lean * y
+    y = uplift * lacks / (c.c_yy - lean * c.c_xy + uplift * equilibrium.stiffness)
+    x = grip * (lacks - equilibrium.stiffness * y) / c.c_xx - lean * y
     return -x, -y
 
 

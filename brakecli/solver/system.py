@@ -14,7 +14,7 @@ from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.pad import Pad, build_pad, default_nodes, fewest_nodes, window_rows, window_width
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.method import MOST_EVALUATIONS, Method
-from brakecli.solver.records import Weights
+from brakecli.solver.records import Grid, Weights, new
 from brakecli.solver.roughness import Surface
 from brakecli.solver.schedules import Schedule, knots, value_at, values
 
@@ -22,12 +22,8 @@ MOST_STEPS = 1e11
 MOST_TABLE_BYTES = 4e9
 WHOLE = 1e-9
 """A ratio this close to a whole number is whole."""
-_SMALL_TABLES = 1e6
 _build_small = lru_cache(maxsize=8)(build_pad)
 """Pads that points of a sweep have in common; nobody changes them."""
-RADIANS = 0.8
-"""Largest angle that the fastest motion turns by in an exact step: so small that a margin is lowest in it once at
-most, and that the series of the step need few terms."""
 
 
 @dataclass(frozen=True)
@@ -40,16 +36,20 @@ class Initial:
     vy: float = 0.0
     from_equilibrium: bool = False
 
-    def beside(self, rest: tuple[float, float] | Floats) -> Floats:
-        """x, y, v_x and v_y, where steady sliding is at `rest` (x, y)."""
-        x, y = rest if self.from_equilibrium else (0.0, 0.0)
+    def beside(self, equilibrium: tuple[float, float] | Floats) -> Floats:
+        """x, y, v_x and v_y, where steady sliding is at `equilibrium` (x, y)."""
+        x, y = equilibrium if self.from_equilibrium else (0.0, 0.0)
         return np.array([self.x + x, self.y + y, self.vx, self.vy])
 
 
 def longest_step(c: Coefficients, stiffness: float) -> float:
-    """The longest exact step, s, by bounds of the fastest motion and of the fastest decay; stiffness in N/m."""
+    """The longest exact step, s, by bounds of the fastest motion and of the fastest decay; stiffness in N/m.
+
+    The motion turns by 0.8 rad in it: so little that a margin is lowest in it once at most, and that the series of
+    the step need few terms.
+    """
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * stiffness
-    return RADIANS / (math.sqrt(bound / c.m) + (c.b_xx + c.b_yy) / c.m)
+    return 0.8 / (math.sqrt(bound / c.m) + (c.b_xx + c.b_yy) / c.m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ class System:
     def pad(self) -> Pad:
         """Constants and tables of the contact."""
         self.refuse_tables()
-        build = _build_small if self.table_bytes < _SMALL_TABLES else build_pad
+        build = _build_small if self.table_bytes < 1e6 else build_pad
         return build(self.layer_stiffness, self.half_length, self.shoe, self.wheel, self.nodes)
 
     @cached_property
@@ -134,8 +134,8 @@ class System:
         if not contact.EVALUATORS[self.evaluator].needs_nodes:
             return 0
         pad = self.half_length, self.shoe, self.wheel
-        asked = self.method.nodes or default_nodes(self.evaluator, *pad)
-        return max(asked + asked % 2, fewest_nodes(*pad))
+        nodes = self.method.nodes or default_nodes(self.evaluator, *pad)
+        return max(nodes + nodes % 2, fewest_nodes(*pad))
 
     @property
     def scheme(self) -> schemes.SchemeModule:
@@ -182,13 +182,13 @@ class System:
         """Waves per metre of the shortest wave of both surfaces, 1/m; 0 where they are smooth."""
         return max([*self.shoe.turns.tolist(), *self.wheel.turns.tolist()], default=0.0)
 
-    def refuse_steps(self, held: float) -> None:
+    def refuse_steps(self, size: float) -> None:
         """Raise RefusedError where a run would not end, or hold samples of too many bytes in memory."""
         if self.steps > MOST_STEPS:
             remedy = "reduce solver.duration and output.sample_interval, or increase solver.step"
             raise RefusedError(f"the run is too long: {self.steps:.3g} steps; {remedy}")
-        if held > MOST_TABLE_BYTES:
-            what = f"histories of {self.samples:.3g} samples are held in memory, which takes {held / 1e9:.3g} GB"
+        if size > MOST_TABLE_BYTES:
+            what = f"histories of {self.samples:.3g} samples are held in memory, which takes {size / 1e9:.3g} GB"
             remedy = "reduce solver.duration, or increase output.sample_interval"
             raise RefusedError(f"{what}; {remedy}")
 
@@ -201,8 +201,8 @@ class System:
     def per_sample(self) -> int:
         """Steps of a sample interval."""
         method = self.method
-        asked = method.share * self.longest_step if method.row.exact else None if method.own_steps else method.step
-        return _at_least(self.interval / (asked or self.interval))
+        step = method.share * self.longest_step if method.row.exact else None if method.own_steps else method.step
+        return _at_least(self.interval / (step or self.interval))
 
     @property
     def longest_step(self) -> float:
@@ -236,22 +236,21 @@ class System:
         return Weights(self.step, theta_1, theta_2, theta_3)
 
     @property
-    def grid(self) -> dict[str, float]:
-        """The grid of time as the loop sees it, by the names of `records.GRID`."""
+    def grid(self) -> Grid:
+        """The grid of time as the loop sees it."""
         method = self.method
-        scheme = self.scheme
-        return {
-            "interval": self.interval,
-            "weighted": scheme.weighted_time(self.weights),
-            "tolerance": method.tolerance,
-            "per_sample": self.per_sample,
-            "lag": scheme.LAG,
-            "most": MOST_EVALUATIONS[method.iteration],
-            "go_on": int(method.allow_unconverged),
-            "samples": self.samples,
-            "scheme": list(schemes.SCHEMES).index(method.scheme),
-            "iteration": list(MOST_EVALUATIONS).index(method.iteration),
-        }
+        grid = new(Grid)
+        grid.interval = self.interval
+        grid.weighted = self.scheme.weighted_time(self.weights)
+        grid.tolerance = method.tolerance
+        grid.per_sample = self.per_sample
+        grid.lag = self.scheme.LAG
+        grid.most = MOST_EVALUATIONS[method.iteration]
+        grid.go_on = int(method.allow_unconverged)
+        grid.samples = self.samples
+        grid.scheme = list(schemes.SCHEMES).index(method.scheme)
+        grid.iteration = list(MOST_EVALUATIONS).index(method.iteration)
+        return grid
 
 
 def _at_least(ratio: float) -> int:

@@ -5,14 +5,14 @@ beside its history, `runs.against` asks of a motion of the equations.
 """
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from brakecli.solver.alike import by_rows
 from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
-from brakecli.solver.records import PARTS
+from brakecli.solver.records import PARTS, Tangent
 
 BATCHES = 8
 """Batches of the parts of the second half of a run; of twice as many parts each, half as many."""
@@ -36,7 +36,7 @@ class Exponent(NamedTuple):
     even_error: float = math.nan  # motion is linear: it swings about an exponential function
 
 
-def seed(t: Any) -> None:
+def seed(t: Tangent) -> None:
     """Begin with a disturbance of size one in no particular direction."""
     t.on = 1
     t.x = 0.5 / t.rate
@@ -52,8 +52,8 @@ def _error_of_mean(rates: Floats) -> Floats:
     2/3, and two neighbours the covariance 1/6: the mean has (3 n - 1)/3n² where s²/n is (2 n - 1)/3n².
     """
     n = len(rates)
-    found: Floats = rates.std(axis=0, ddof=1) * math.sqrt((3.0 * n - 1.0) / (2.0 * n - 1.0) / n)
-    return found
+    error: Floats = rates.std(axis=0, ddof=1) * math.sqrt((3.0 * n - 1.0) / (2.0 * n - 1.0) / n)
+    return error
 
 
 def _line(sizes: Floats, apart: float) -> tuple[Floats, Floats]:
@@ -68,20 +68,20 @@ def _line(sizes: Floats, apart: float) -> tuple[Floats, Floats]:
     places = (np.arange(count) - 0.5 * (count - 1)) * apart
     squares = places @ places
     slopes = places @ sizes / squares
-    rest = sizes - sizes.mean(axis=0) - np.outer(places, slopes)
-    left = (rest**2).sum(axis=0)
-    shown = (rest[1:] * rest[:-1]).sum(axis=0) / np.maximum(left, LEAST)
+    beside = sizes - sizes.mean(axis=0) - np.outer(places, slopes)
+    scatter = (beside**2).sum(axis=0)
+    shown = (beside[1:] * beside[:-1]).sum(axis=0) / np.maximum(scatter, LEAST)
     alike = np.clip(shown + (2.0 + 4.0 * shown) / count, 0.0, 1.0)
     independent = count * (1.0 - alike) / (1.0 + alike)
-    errors = np.sqrt(left / np.maximum(independent - 2.0, 1.0) / squares)
+    errors = np.sqrt(scatter / np.maximum(independent - 2.0, 1.0) / squares)
     return slopes, errors
 
 
 def _trend(rates: Floats) -> Floats:
     """By how much a line rises or falls over all rates; 0 where its slope is less than `SURE` of its errors."""
     slopes, errors = _line(rates, 1.0)
-    found: Floats = np.where(np.abs(slopes) > SURE * errors, np.abs(slopes) * len(rates), 0.0)
-    return found
+    change: Floats = np.where(np.abs(slopes) > SURE * errors, np.abs(slopes) * len(rates), 0.0)
+    return change
 
 
 def exponents(logs: Floats, duration: float) -> list[Exponent]:
@@ -104,7 +104,7 @@ def exponents(logs: Floats, duration: float) -> list[Exponent]:
 
 
 @kernel
-def renew(t: Any, number: int, samples: int) -> float:
+def renew(t: Tangent, number: int, samples: int) -> float:
     """Note the growth up to a sample, and go on with a disturbance of size one; what it was multiplied by.
 
     The square of its size is rate² (x² + y²) + v_x² + v_y².
@@ -118,9 +118,9 @@ def renew(t: Any, number: int, samples: int) -> float:
         t.v_x = 0.0
         t.v_y = 0.0
         return 0.0
-    part = 1.0 / size
-    t.x = part * t.x
-    t.y = part * t.y
-    t.v_x = part * t.v_x
-    t.v_y = part * t.v_y
-    return part
+    factor = 1.0 / size
+    t.x = factor * t.x
+    t.y = factor * t.y
+    t.v_x = factor * t.v_x
+    t.v_y = factor * t.v_y
+    return factor

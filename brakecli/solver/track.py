@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,7 @@ from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.energy import Mechanical
 from brakecli.solver.kernels import kernel
-from brakecli.solver.records import EVENT, MOST_EVENTS, PARTS, Weights
+from brakecli.solver.records import EVENT, MOST_EVENTS, PARTS, Notes, Weights, Works
 
 MAX, MIN, STICK, SLIP, LIFT, TOUCH, TURN = range(7)
 """Kinds of events: turning points of x, begin and end of a stick, end and begin of contact, and sliding that turns
@@ -59,7 +59,7 @@ class Powers(NamedTuple):
 class Track:
     """What the loop has noted.
 
-    `works` has columns as `records.WORK`, `stored` kinetic energy and the energies of links and contact, `states`
+    `works` has columns as `records.Works`, `stored` kinetic energy and the energies of links and contact, `states`
     x, y (m), vx and vy (m/s), with one row for each of the marks at `times`. `counts` has all events of each kind,
     also those that are no longer kept.
     """
@@ -113,24 +113,23 @@ class Track:
         works = np.diff(self.works[first:], axis=0)
         friction = works[:, 0] - works[:, 1] - force * np.diff(self.states[first:, 0])
         roughness = works[:, 4]
-        left = friction + roughness - works[:, 2] - works[:, 5]
-        return np.column_stack([friction, roughness, left, np.diff(self.times[first:])])
+        remaining = friction + roughness - works[:, 2] - works[:, 5]
+        return np.column_stack([friction, roughness, remaining, np.diff(self.times[first:])])
 
 
-_NONE = np.zeros(0)
 UNTRACKED = Track(
-    _NONE,
+    np.zeros(0),
     np.zeros((0, 6)),
     np.zeros((0, 3)),
     np.zeros((0, 4)),
     np.zeros(len(KINDS), np.int64),
     -math.inf,
-    Events(_NONE, np.zeros(0, np.int8), _NONE, np.zeros((0, 3))),
+    Events(np.zeros(0), np.zeros(0, np.int8), np.zeros(0), np.zeros((0, 3))),
 )
 """Track of a motion of which nothing has been noted."""
 
 
-def follow(t: Any, v_x: float, events_at: int) -> None:
+def follow(t: Notes, v_x: float, events_at: int) -> None:
     """Note all from the start on, with the velocity there (m/s); events are kept there in the scratch."""
     t.on = 1
     t.events_at = events_at
@@ -140,7 +139,7 @@ def follow(t: Any, v_x: float, events_at: int) -> None:
 
 
 def tracked(
-    t: Any, scratch: Floats, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool
+    t: Notes, scratch: Floats, c: Coefficients, s: Weights, energies: Callable[..., Mechanical], light: bool
 ) -> Track:
     """What has been noted; `light` where the work of the roughness lacks the change of the contact's store."""
     x, y, v_x, v_y, x_old, y_old, contact = t.states[: t.marks].T.copy()
@@ -152,15 +151,15 @@ def tracked(
     n = min(int(t.events), MOST_EVENTS)
     events = scratch[t.events_at : t.events_at + EVENT * n].reshape(n, EVENT)
     events = events[np.argsort(events[:, 0], kind="stable")]
-    time, kind, place = events[:, :3].T.copy()
-    kept = Events(time, kind.astype(np.int8), place, events[:, 3:].copy())
+    time, kind, x_at = events[:, :3].T.copy()
+    kept = Events(time, kind.astype(np.int8), x_at, events[:, 3:].copy())
     stored = np.column_stack([kinetic, links, contact])
     states = np.column_stack([x, y, v_x, v_y])
     return Track(t.times[: t.marks].copy(), works, stored, states, t.counts.copy(), float(t.since), kept)
 
 
 @kernel(inline=False)
-def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float) -> int:
+def mark(t: Notes, work: Works, number: int, samples: int, time: float, store: float) -> int:
     """Make a mark at a sample, and say when the next one is due; the row of `states` that gets the state there."""
     at = t.marks
     parts = min(PARTS, samples)
@@ -175,11 +174,11 @@ def mark(t: Any, work: Any, number: int, samples: int, time: float, store: float
     t.states[at, 6] = store
     t.marks = at + 1
     t.next = ((number * parts // samples + 1) * samples + parts - 1) // parts
-    return at  # type: ignore[no-any-return]
+    return at
 
 
 @kernel(inline=False)
-def put(t: Any, scratch: Floats, kind: int, time: float, x: float) -> None:
+def put(t: Notes, scratch: Floats, kind: int, time: float, x: float) -> None:
     """Note an event; the last ones are kept."""
     at = t.events_at + EVENT * (t.events % MOST_EVENTS)
     if t.events >= MOST_EVENTS:
@@ -192,7 +191,7 @@ def put(t: Any, scratch: Floats, kind: int, time: float, x: float) -> None:
 
 
 @kernel(inline=False)
-def enter(t: Any, scratch: Floats, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
+def enter(t: Notes, scratch: Floats, phase: int, time: float, x: float, y: float, v_x: float, v_y: float) -> None:
     """Note the events with which a phase begins, and the motion there; the first one begins without any."""
     was = t.phase
     t.phase = phase
@@ -217,7 +216,7 @@ def enter(t: Any, scratch: Floats, phase: int, time: float, x: float, y: float, 
 
 
 @kernel
-def turned(t: Any, v_x: float) -> int:
+def turned(t: Notes, v_x: float) -> int:
     """The kind of a turning point that a velocity (m/s) on the other side of zero tells of; -1 if it does not."""
     kind = -1
     if v_x * t.way < 0.0:

@@ -17,6 +17,7 @@ from scipy.optimize import brentq
 from brakecli.solver.contact import EVALUATORS as ROWS
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import ContactLayer, Pad, build_layer, build_pad
+from brakecli.solver.records import Contact
 from brakecli.solver.roughness import Surface, surface, wheel_angles
 
 EPS = 2.0**-52
@@ -167,7 +168,7 @@ class Gap:
     def evaluate(
         self, evaluator: str, *, nodes: int = NODES, dx: float = 0.0, dy: float = 0.0, pad: Pad | None = None
     ) -> Any:
-        """What the package computes with the shoe moved by (dx, dy): a record of CONTACT."""
+        """What the package computes with the shoe moved by (dx, dy): a record of `Contact`."""
         layer = unfilled(evaluator, self.pad(nodes) if pad is None else pad)
         layer.angles[:] = self.angles
         fill(self.x + dx, self.y + dy, *layer)
@@ -178,14 +179,14 @@ def unfilled(evaluator: str, pad: Pad) -> ContactLayer:
     """The package's layer with nothing in it that an evaluator might take for a result."""
     layer = build_layer(evaluator, pad)
     layer.scratch[: int(layer.layer.angles_at)] = np.nan
-    for name in layer.contact.dtype.names:
+    for name in Contact.layout.names or ():
         if name != "reach":  # which is given
-            layer.contact[name] = -1 if name in ("kind", "valid") else np.nan
+            setattr(layer.contact, name, -1 if name in ("kind", "valid") else np.nan)
     return layer
 
 
 def outputs(found: Any) -> NDArray[np.float64]:
-    """The quantities of a record of CONTACT, in their order, without what it notes beside them."""
+    """The quantities of a record of `Contact`, in their order, without what it notes beside them."""
     return np.array(found.tolist()[:6])
 
 

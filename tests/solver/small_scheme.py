@@ -8,7 +8,7 @@ from brakecli.solver.energy import energy_at_level
 from brakecli.solver.kernels import kernel
 from brakecli.solver.records import Pair, Weights
 
-STATE = records.STATE
+STATE = records.State
 KEPT = "state"
 LAG = 0
 MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")

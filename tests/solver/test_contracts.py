@@ -19,7 +19,7 @@ from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import auto, cells, closed_form, exact, midpoint
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.records import MOST_KINDS, PROBLEM, WORK, Weights, new
+from brakecli.solver.records import MOST_KINDS, Problem, Weights, Works, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.steps import event_driven, piecewise_exact, three_layer, two_layer
 from brakecli.solver.steps.implicit import SOLVED, newton
@@ -104,7 +104,8 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
         pad = build_pad(10 ** rng.uniform(0, 16), 0.05, shoe, wheel, 64)
         layer = unfilled(name.replace("_", "-"), pad)
         layer.angles[:] = rng.uniform(-6, 0, wheel.g.size)
-        given = layer.layer.pad.tobytes(), layer.tables.tobytes(), layer.angles.tobytes()
+        numbers: Any = layer.layer.pad
+        given = numbers.tobytes(), layer.tables.tobytes(), layer.angles.tobytes()
         y = rng.uniform(-1.5, 1.5) * height
         fill(rng.uniform(-1e-2, 1e-2), y, *layer)
         filled = layer.contact
@@ -121,7 +122,7 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
             assert (
                 filled.store >= -1e-14 * pad.constants.k * 2 * pad.constants.half_length * (height + abs(y)) ** 2
             )
-        assert (layer.layer.pad.tobytes(), layer.tables.tobytes(), layer.angles.tobytes()) == given
+        assert (numbers.tobytes(), layer.tables.tobytes(), layer.angles.tobytes()) == given
         valid += filled.valid == 1
         kinds.add(contact.kinds()[filled.kind])
     assert valid > 50
@@ -131,7 +132,7 @@ def test_an_evaluator_fills_its_results_and_leaves_everything_else(name: str) ->
 @pytest.mark.parametrize("name", EVALUATORS)
 def test_an_evaluator_is_accepted_by_the_step(name: str) -> None:
     pad = build_pad(1e8, 0.05, surface(), surface(), 64)
-    problem = new(PROBLEM)
+    problem = new(Problem)
     problem.a_11 = 1e6
     problem.a_22 = 1e6
     problem.gain = 0.1
@@ -181,7 +182,7 @@ def test_a_module_without_evaluate_is_no_evaluator() -> None:
 def test_a_scheme_states_what_the_loop_needs_of_it(name: str) -> None:
     scheme: Any = load(name.replace("_", "-"))
     assert scheme.LAG in (0, 1)
-    assert set(scheme.VELOCITIES) <= set(scheme.MEMORY) <= set(scheme.STATE.names)
+    assert set(scheme.VELOCITIES) <= set(scheme.MEMORY) <= set(scheme.STATE.layout.names)
     checked = 0
     for theta in weights_of(name):
         weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
@@ -222,10 +223,10 @@ def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: 
     for theta in weights_of(name):
         weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
         state = new(scheme.STATE)
-        problem = new(PROBLEM)
-        work = new(WORK)
+        problem: Any = new(Problem)
+        work: Any = new(Works)
         scheme.begin(weights, state, *START)
-        for field in PROBLEM.names or ():
+        for field in Problem.layout.names or ():
             problem[field] = np.nan
         problem.load = 5e3
         problem.belt_now = 1.0

@@ -86,7 +86,7 @@ def test_the_nodes_of_a_lane_leave_out_what_their_gaps_say() -> None:
         evaluate(o, alike, table, gaps_at_nodes)
         for n, x in enumerate(places):
             gap = gaps(each, x, o.at_y[n])
-            assert o.found[n] == pytest.approx(
+            assert o.at_force[n] == pytest.approx(
                 each.layer_stiffness * spacing * gap[gap > 0.0].sum(), rel=1e-9, abs=1e-9
             )
             found.append((o.missing[n], each.layer_stiffness * spacing * left_out(gap)))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -14,7 +14,7 @@ from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.friction import minimise
 from brakecli.solver.integrate import Stepping
 from brakecli.solver.method import MOST_EVALUATIONS
-from brakecli.solver.records import PROBLEM, new
+from brakecli.solver.records import Problem, new
 from brakecli.solver.roughness import Surface, surface
 from brakecli.solver.steps.implicit import SOLVED, UNCONVERGED, fixed_point, newton
 from tests.campaign import campaign, counts
@@ -48,7 +48,7 @@ class Step:
         self.contact = self.layer.contact
         if angles is not None:
             self.layer.angles[:] = angles
-        self.given = new(PROBLEM)
+        self.given = cast(Any, new(Problem))
         self.given.phi = phi
         self.given.normal_force = guess
         for name, value in entries.items():
@@ -63,7 +63,7 @@ class Step:
         """F_y where the minimiser puts the shoe under the normal force `force`."""
         p = self.given
         d, e, _ = minimise(p.a_11, p.a_12, p.a_22, p.g_1, p.g_2 + force, self.phi * force, p.belt)
-        layer = self.layer.layer.copy()
+        layer = cast(Any, self.layer.layer).copy()
         evaluate(p.x_0 + p.gain * d, p.y_0 + p.gain * e, layer, *self.layer[1:])  # interpreted, as the step is
         return float(layer.contact.normal_force)
 
@@ -250,7 +250,7 @@ def test_every_step_of_a_run_meets_the_tolerance_with_one_evaluation_in_most(sch
     for level in range(int(run.counts.level) + 1, 701):
         run.block(level)
         p = run.plant.problem
-        layer = run.plant.layer.copy()
+        layer = cast(Any, run.plant.layer).copy()
         fill(p.x_0 + p.gain * p.d, p.y_0 + p.gain * p.e, layer, run.contact.tables, run.contact.scratch.copy())
         found = layer.contact
         rounding = 4 * EPS * found.stiffness * (abs(p.y_0) + abs(p.gain * p.e))

@@ -14,10 +14,10 @@ from brakecli.solver.phases import (
     UNDECIDED,
     counted,
     following,
-    held,
     side_of,
     sliding_phase,
     stalled,
+    stick_or_slip,
 )
 
 TOUCHING = (BACKWARD, STICK, FORWARD)
@@ -40,14 +40,19 @@ def test_a_slip_that_ends_leaves_it_to_the_forces() -> None:
 
 def test_stick_ends_in_the_slip_that_friction_cannot_prevent() -> None:
     """Friction that would have to pull the shoe along harder than it can leaves it behind the wheel."""
-    assert following(STICK, PULL, 0.0) == held(-1.0, 5.0, 0.0, 0.0) == BACKWARD
-    assert following(STICK, PUSH, 0.0) == held(5.0, -1.0, 0.0, 0.0) == FORWARD
+    assert following(STICK, PULL, 0.0) == stick_or_slip(-1.0, 5.0, 0.0, 0.0) == BACKWARD
+    assert following(STICK, PUSH, 0.0) == stick_or_slip(5.0, -1.0, 0.0, 0.0) == FORWARD
 
 
 def test_friction_holds_to_the_edge_of_its_cone_and_by_the_rounding_beyond_it() -> None:
-    assert held(0.0, 2.0, 0.0, 0.0) == held(-1e-9, 2.0, 1e-9, 0.0) == held(2.0, -1e-9, 0.0, 1e-9) == STICK
-    assert held(-1.1e-9, 2.0, 1e-9, 0.0) == BACKWARD
-    assert held(2.0, -1.1e-9, 0.0, 1e-9) == FORWARD
+    assert (
+        stick_or_slip(0.0, 2.0, 0.0, 0.0)
+        == stick_or_slip(-1e-9, 2.0, 1e-9, 0.0)
+        == stick_or_slip(2.0, -1e-9, 0.0, 1e-9)
+        == STICK
+    )
+    assert stick_or_slip(-1.1e-9, 2.0, 1e-9, 0.0) == BACKWARD
+    assert stick_or_slip(2.0, -1.1e-9, 0.0, 1e-9) == FORWARD
 
 
 def test_the_side_is_the_sign_of_the_sliding_velocity_and_none_in_flight() -> None:

@@ -12,7 +12,7 @@ from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, solve
 from brakecli.solver.quantities import ContactState
-from brakecli.solver.records import MOST_EVENTS, PARTS, WORK
+from brakecli.solver.records import MOST_EVENTS, PARTS, Works
 from brakecli.solver.track import KINDS, LIFT, MAX, MIN, SLIP, STICK, TOUCH, TURN, Track
 from tests.analysis.histories import events_from_samples
 from tests.analysis.shoes import Tables, random_shoes
@@ -260,7 +260,7 @@ def test_works_are_those_of_the_run_and_friction_gives_what_samples_say(scheme: 
     assert track is not None
     assert len(track.times) <= PARTS + 1
     assert track.times[0] <= 1e-5 < end <= track.times[-1] < end + 1e-5
-    total = [getattr(motion.energy, name) for name in list(WORK.fields or ())[:6]]
+    total = [getattr(motion.energy, name) for name in list(Works.layout.fields or ())[:6]]
     np.testing.assert_allclose(track.works[-1], total, rtol=1e-12)
     powers = track.powers(0.0, end)
     given = motion.rows[:, 4] * motion.rows[:, 2]

@@ -10,7 +10,7 @@ from brakecli.solver.arrays import Floats
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.method import MOST_EVALUATIONS, Method
-from brakecli.solver.records import PROBLEM, WORK, Weights, new
+from brakecli.solver.records import Problem, Weights, Works, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.schemes import SteppingModule, module_of
 from brakecli.solver.steps.implicit import newton
@@ -40,7 +40,7 @@ def step_limits(system: System, step: float | None = None) -> StepLimits:
     c = system.coefficients
     contact_stiffness = system.contact_stiffness
     s = system.weights if step is None else system.weights._replace(h=step)
-    problem = new(PROBLEM)
+    problem = new(Problem)
     scheme.prepare(c, s, new(scheme.STATE), problem)
     a_11, a_12, a_22, gain = (float(entry) for entry in (problem.a_11, problem.a_12, problem.a_22, problem.gain))
     a = a_11 * a_22 - a_12 * a_12
@@ -71,7 +71,7 @@ def amplification(c: Coefficients, s: Weights, scheme: SteppingModule, contact_s
 
     def step(moved: str | None = None, by: float = 0.0) -> Floats:
         state = new(scheme.STATE)
-        problem = new(PROBLEM)
+        problem = new(Problem)
         state.y = state.y_old = -1.0
         state.force = problem.load = contact_stiffness
         problem.belt_now = problem.belt_next = 1e3 / s.h  # a belt so fast that nothing sticks
@@ -79,7 +79,7 @@ def amplification(c: Coefficients, s: Weights, scheme: SteppingModule, contact_s
             state[moved] += by
         scheme.prepare(loaded, s, state, problem)
         newton(*layer, problem, MOST_EVALUATIONS["newton"])
-        scheme.finish(loaded, s, state, problem, layer.contact, new(WORK))
+        scheme.finish(loaded, s, state, problem, layer.contact, new(Works))
         return np.array([state[name] for name in scheme.MEMORY]) / scales
 
     neighbours = [step(name, DIFFERENCE * scale) for name, scale in zip(scheme.MEMORY, scales, strict=True)]

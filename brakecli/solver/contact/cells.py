@@ -28,9 +28,9 @@ def _cell(high: float, low: float) -> tuple[float, float, float, float]:
     1/(h - l). θ is 1, h/(h - l) or 0; h⁺ and l⁺ are 0 where the gap is negative.
     """
     inverse = np.divide(1.0, high - low if high - low > _TINY else _TINY)
-    press = high if high > 0.0 else 0.0
-    rest = low if low > 0.0 else 0.0
-    return 1.0 if low > 0.0 else press * inverse, press, rest, inverse
+    deep = high if high > 0.0 else 0.0
+    shallow = low if low > 0.0 else 0.0
+    return 1.0 if low > 0.0 else deep * inverse, deep, shallow, inverse
 
 
 @kernel(fastmath=FAST)
@@ -41,9 +41,9 @@ def _pressed(y: float, gap: Floats) -> tuple[float, float]:
     for j in range(gap.size - 1):
         one = gap[j] - y
         two = gap[j + 1] - y
-        part, press, rest, _ = _cell(one if one > two else two, two if one > two else one)
-        force += part * (press + rest)
-        touching += part
+        theta, deep, shallow, _ = _cell(one if one > two else two, two if one > two else one)
+        force += theta * (deep + shallow)
+        touching += theta
     return 0.5 * force, touching
 
 
@@ -59,11 +59,11 @@ def _pressed_steeply(y: float, gap: Floats, rises: Floats) -> tuple[float, float
         falls = one > two
         rise_one = rises[j]
         rise_two = rises[j + 1]
-        part, press, rest, _ = _cell(one if falls else two, two if falls else one)
-        force += part * (press + rest)
-        touching += part
+        theta, deep, shallow, _ = _cell(one if falls else two, two if falls else one)
+        force += theta * (deep + shallow)
+        touching += theta
         turn = rise_one - rise_two
-        rise += part * (rise_one + rise_two + (1.0 - part) * (turn if falls else -turn))
+        rise += theta * (rise_one + rise_two + (1.0 - theta) * (turn if falls else -turn))
     return 0.5 * force, touching, 0.5 * rise
 
 
@@ -90,12 +90,14 @@ def _sums(y: float, reach: float, gap: Floats, rises: Floats) -> tuple[float, fl
         rise_two = rises[j + 1]
         of_high = rise_one if falls else rise_two
         of_low = rise_two if falls else rise_one
-        part, press, rest, inverse = _cell(high, low)
-        force += part * (press + rest)
-        touching += part
-        square += part * (press * press + press * rest + rest * rest)
-        rise += part * ((2.0 - part) * of_high + part * of_low)
-        work += (part * press * (3.0 - part) + rest) * of_high + (part * part * press + 2.0 * rest) * of_low
+        theta, deep, shallow, inverse = _cell(high, low)
+        force += theta * (deep + shallow)
+        touching += theta
+        square += theta * (deep * deep + deep * shallow + shallow * shallow)
+        rise += theta * ((2.0 - theta) * of_high + theta * of_low)
+        work += (theta * deep * (3.0 - theta) + shallow) * of_high + (
+            theta * theta * deep + 2.0 * shallow
+        ) * of_low
         within = (high if high < reach else reach) - (low if low > -reach else -reach)
         within = within if within > _TINY else _TINY
         near += (within if high >= -reach and low <= reach else 0.0) * inverse
@@ -112,11 +114,11 @@ def _bent(mean: float, slope: float, bend: float) -> float:
     to_roots = -(slope + math.copysign(math.sqrt(square), slope))
     one = to_roots / bend
     two = 2.0 * middle / to_roots if to_roots != 0.0 else 0.0
-    left = min(max(min(one, two), -0.5), 0.5)
-    right = min(max(max(one, two), -0.5), 0.5)
-    both = left + right
-    between = middle + 0.5 * slope * both + bend / 6.0 * (both * both - left * right)
-    between = between * (right - left)
+    low = min(max(min(one, two), -0.5), 0.5)
+    high = min(max(max(one, two), -0.5), 0.5)
+    both = low + high
+    between = middle + 0.5 * slope * both + bend / 6.0 * (both * both - low * high)
+    between = between * (high - low)
     return between if bend < 0.0 else mean - between
 
 
@@ -141,9 +143,9 @@ def left_out(y: float, layer: Layer, scratch: Floats) -> float:
         bend = 0.5 * (before - one - two + after)
         cut = one * two < 0.0
         if cut or 12.0 * min(abs(one), abs(two)) < abs(bend):
-            part, press, rest, _ = _cell(max(one, two), min(one, two))
+            theta, deep, shallow, _ = _cell(max(one, two), min(one, two))
             mean = 0.5 * (one + two)
-            total += _bent(mean, two - one, bend) - 0.5 * part * (press + rest)
+            total += _bent(mean, two - one, bend) - 0.5 * theta * (deep + shallow)
             if cut:
                 u = mean / (one - two)
                 turn = after - before - 3.0 * (two - one)
@@ -151,7 +153,7 @@ def left_out(y: float, layer: Layer, scratch: Floats) -> float:
         before = one
         one = two
         two = after
-    return pad.k * (2.0 * pad.half_length / pad.nodes) * total  # type: ignore[no-any-return]
+    return pad.k * (2.0 * pad.half_length / pad.nodes) * total
 
 
 @kernel(inline=False)

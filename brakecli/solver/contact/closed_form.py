@@ -1,21 +1,18 @@
 """The contact in closed form: smooth surfaces, or a pad that a bound proves to touch (or to clear) everywhere."""
 
 import math
-from typing import Any
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import CLOSED_FORM
 from brakecli.solver.contact.heights import eights, phases
 from brakecli.solver.kernels import kernel, stopped
-from brakecli.solver.records import Layer
+from brakecli.solver.records import Contact, Layer, PadNumbers
 
-CLEAR = 0
-PARTLY = 1
-FULL = 2
+CLEAR, PARTLY, FULL = range(3)
 
 
 @kernel
-def coverage(y: float, pad: Any) -> int:
+def coverage(y: float, pad: PadNumbers) -> int:
     """FULL or CLEAR where bounds on the surfaces prove that the pad touches everywhere or nowhere, or PARTLY."""
     if y >= pad.clear_from:
         return CLEAR
@@ -97,7 +94,7 @@ def full_press(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats
 
 
 @kernel
-def clear(contact: Any) -> None:
+def clear(contact: Contact) -> None:
     """The pad touches nowhere: no force, nothing stored."""
     contact.normal_force = contact.stiffness = contact.tangential = contact.fraction = 0.0
     contact.store = contact.store_x = 0.0

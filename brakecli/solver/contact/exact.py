@@ -10,7 +10,6 @@ but to follow its root.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -19,49 +18,25 @@ from brakecli.solver.contact import EXACT
 from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage
 from brakecli.solver.double_double import EPSILON
 from brakecli.solver.kernels import kernel, stopped
-from brakecli.solver.records import Layer
+from brakecli.solver.records import Contact, Layer, PadNumbers
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.sine import sine_cosine
 
 # `waves` holds, for every harmonic of the gap (the wheel's first, the shoe's with minus): amplitude, wavenumber,
 # phase, and for one interval sine and cosine of the phase in its middle, the half width times omega, and sine and
 # cosine of that. Then come the numbers of the last evaluation, and those of each cell.
-_SINE = 3
-_COSINE = 4
-_HALF = 5
-_SINE_HALF = 6
-_COSINE_HALF = 7
-_LAST = 8
+_SINE, _COSINE, _HALF, _SINE_HALF, _COSINE_HALF, _LAST = range(3, 9)
 
-_MOVED = 0
-_TURNED = 1
-_HEIGHT = 2
-_START = 3
-_FOURTH = 4
-_ROUNDING = 5
-_CELLS = 6
+_MOVED, _TURNED, _HEIGHT, _START, _FOURTH, _ROUNDING, _CELLS = range(7)
 """Odometers of the gap (m) and of its slope; y (m); where the interval that touches begins (m), or infinity;
 bounds of the gap's fourth derivative and of the rounding in the gap (m)."""
 
-_FREE = 0
-_MONOTONE = 1
-_PLACE = 2
-_PER_CELL = 3
+_FREE, _MONOTONE, _PLACE, _PER_CELL = range(4)
 """Readings of the odometers up to which a cell has no root, and up to which the gap is monotone in it; the sign of
 the gap where it has no root, otherwise the root (m)."""
 
 _SURE = 0.999
-_ROUND = 1e3
-_SLACK = 1e-12
-"""What is taken of a bound; after how many heights of the roughness an odometer begins anew, and its rounding by
-then, over that height."""
-_NEAR = 0.5  # rad, below which the sine of a difference is not taken from sines
-# of a search for a root, and the last of them over where it is
-_MOST_STEPS = 100
-_ROUNDED = 2e-16
-_FOLLOWING = 6  # steps of Halley's iteration, after which the root is searched for
-_WIDER = 4.0  # half widths: the next part of a cell is twice as wide as the last one
-_FOLLOWED = 1e-5  # a step of Halley's iteration, over the cell, after which it is exact
+"""What is taken of a bound."""
 
 
 @kernel(inline=False)
@@ -87,39 +62,40 @@ def _gap(xi: float, y: float, n: int, waves: Floats) -> tuple[float, float, floa
 
 
 @kernel(inline=False)
-def _root(left: float, right: float, at_left: float, y: float, n: int, waves: Floats) -> float:
-    """The root of a gap that is monotone on [left, right] and changes sign: Newton inside the bracket."""
-    xi = 0.5 * (left + right)
-    for _ in range(_MOST_STEPS):
+def _root(low: float, high: float, at_low: float, y: float, n: int, waves: Floats) -> float:
+    """The root of a gap that is monotone on [low, high] and changes sign: Newton inside the bracket."""
+    xi = 0.5 * (low + high)
+    for _ in range(100):
         gap, slope, _, _ = _gap(xi, y, n, waves)
-        if (gap > 0.0) == (at_left > 0.0):
-            left = xi
+        if (gap > 0.0) == (at_low > 0.0):
+            low = xi
         else:
-            right = xi
-        new = xi - gap / slope if slope != 0.0 else left
-        if not (left < new < right):
-            new = 0.5 * (left + right)
-        if abs(new - xi) <= _ROUNDED * max(abs(left), abs(right)):
+            high = xi
+        new = xi - gap / slope if slope != 0.0 else low
+        if not (low < new < high):
+            new = 0.5 * (low + high)
+        if abs(new - xi) <= 2e-16 * max(abs(low), abs(high)):  # of where it is: rounding
             return new
         xi = new
     return xi
 
 
 @kernel(inline=False)
-def _followed(left: float, right: float, xi: float, y: float, n: int, waves: Floats) -> tuple[float, float]:
-    """The root of a gap that is monotone on [left, right], by Halley's iteration from xi, and the slope there.
+def _halley(low: float, high: float, xi: float, y: float, n: int, waves: Floats) -> tuple[float, float]:
+    """The root of a gap that is monotone on [low, high], by Halley's iteration from xi, and the slope there.
 
     ξ becomes ξ - g g'/(g'² - g g''/2). NaN where the root does not lie inside, or is not found at once.
     """
-    small = _FOLLOWED * (right - left)
-    for _ in range(_FOLLOWING):
+    near = 1e-5  # a step over the cell after which the next would be rounding
+    small = near * (high - low)
+    for _ in range(6):  # more do not pay: the root is searched for then
         gap, slope, second, _ = _gap(xi, y, n, waves)
         bent = slope * slope - 0.5 * gap * second
         step = gap * slope / bent if bent > 0.0 else math.inf
         xi -= step
-        if not (left < xi < right):
+        if not (low < xi < high):
             break
-        if abs(step) <= small and abs(second * step) <= _FOLLOWED * abs(slope):
+        if abs(step) <= small and abs(second * step) <= near * abs(slope):
             return xi, slope
     return math.nan, 0.0
 
@@ -139,7 +115,7 @@ def _sinc_near_zero(z: float) -> float:
 
 
 @kernel(inline=False)
-def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
+def _add_interval(begin: float, end: float, y: float, pad: PadNumbers, waves: Floats, contact: Contact) -> None:
     """Add the closed integrals of a touching interval, without k: ∫ gap, its length, ∫ f2', ∫ gap²/2, ∫ gap f2'.
 
     A wave over the length L about the middle ξ_m has the integral L sinc(ωL/2) g sin(ωξ_m + ψ); products of two
@@ -147,8 +123,8 @@ def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, 
     """
     wheel_terms = pad.wheel_terms
     n = pad.wheel_terms + pad.shoe_terms
-    length = right - left
-    middle = 0.5 * (left + right)
+    length = end - begin
+    middle = 0.5 * (begin + end)
     at_sine = _SINE * n
     at_cosine = _COSINE * n
     at_half = _HALF * n
@@ -195,7 +171,7 @@ def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, 
             other = ch_i * waves[sin_half + j]
             plus = _sinc_of(one + other, half_i + half_j)
             z = half_i - half_j
-            minus = _sinc_near_zero(z) if abs(z) < _NEAR else (one - other) / z
+            minus = _sinc_near_zero(z) if abs(z) < 0.5 else (one - other) / z  # which loses digits near zero
             g = g_i * waves[j]
             omega_j = waves[n + j] if j < wheel_terms else 0.0
             square += 2.0 * g * (minus * (c_i * c_j + s_i * s_j) - plus * (c_i * c_j - s_i * s_j))
@@ -212,32 +188,32 @@ def _add_interval(left: float, right: float, y: float, pad: Any, waves: Floats, 
 
 
 @kernel(inline=False)
-def _turn(touches: bool, place: float, y: float, pad: Any, waves: Floats, contact: Any) -> None:
+def _turn(touches: bool, xi: float, y: float, pad: PadNumbers, waves: Floats, contact: Contact) -> None:
     """From a place on the pad touches, or does not: begin an interval, or add the one that ends."""
     at = _LAST * (pad.wheel_terms + pad.shoe_terms) + _START
     if touches:
-        waves[at] = min(waves[at], place)
-    elif waves[at] < place:
-        _add_interval(waves[at], place, y, pad, waves, contact)
+        waves[at] = min(waves[at], xi)
+    elif waves[at] < xi:
+        _add_interval(waves[at], xi, y, pad, waves, contact)
         waves[at] = math.inf
 
 
 @kernel(inline=False)
-def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Floats, contact: Any) -> None:
+def _look(low: float, high: float, cell: int, y: float, pad: PadNumbers, waves: Floats, contact: Contact) -> None:
     """Walk over the touching intervals of a cell, and keep what is proved of the cell as a whole."""
     n = pad.wheel_terms + pad.shoe_terms
     moved = waves[_LAST * n + _MOVED]
     turned = waves[_LAST * n + _TURNED]
-    slack = _SLACK * pad.crest
+    slack = 1e-12 * pad.crest  # rounding of an odometer before it begins anew
     fourth = waves[_LAST * n + _FOURTH]
     rounding = waves[_LAST * n + _ROUNDING]
     at = _LAST * n + _CELLS + _PER_CELL * cell
     waves[at + _FREE] = waves[at + _MONOTONE] = -1.0
-    begin = left
-    width = right - left
-    while begin < right and not stopped(pad.signals):
-        end = min(begin + width, right)
-        whole = begin == left and end == right
+    begin = low
+    width = high - low
+    while begin < high and not stopped(pad.signals):
+        end = min(begin + width, high)
+        whole = begin == low and end == high
         half = 0.5 * (end - begin)
         gap, slope, second, third = _gap(0.5 * (begin + end), y, n, waves)
         # Taylor: by how much the gap and its slope may differ in the cell from what they are in its middle.
@@ -254,7 +230,7 @@ def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Float
             at_end, _, _, _ = _gap(end, y, n, waves)
             if (gap > 0.0) != (at_end > 0.0):
                 chord = begin + (end - begin) * (gap / (gap - at_end))
-                root, _ = _followed(begin, end, chord, y, n, waves)
+                root, _ = _halley(begin, end, chord, y, n, waves)
                 if math.isnan(root):
                     root = _root(begin, end, gap, y, n, waves)
                 _turn(gap > 0.0, begin, y, pad, waves, contact)
@@ -262,7 +238,7 @@ def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Float
                 if whole:
                     waves[at + _PLACE] = root
                 begin = end
-                width = _WIDER * half
+                width = 4.0 * half  # twice as wide as the last part
                 continue
             free = min(abs(gap), abs(at_end))
         _turn(gap > 0.0, begin, y, pad, waves, contact)
@@ -270,11 +246,11 @@ def _look(left: float, right: float, cell: int, y: float, pad: Any, waves: Float
             waves[at + _FREE] = moved + _SURE * (free - rounding) - slack
             waves[at + _PLACE] = 1.0 if gap > 0.0 else -1.0
         begin = end
-        width = _WIDER * half
+        width = 4.0 * half
 
 
 @kernel(inline=False)
-def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
+def _add_touching(y: float, pad: PadNumbers, waves: Floats, contact: Contact) -> None:
     """Pass over the pad and add every interval on which the gap is positive."""
     n = pad.wheel_terms + pad.shoe_terms
     end = pad.half_length
@@ -283,24 +259,24 @@ def _add_touching(y: float, pad: Any, waves: Floats, contact: Any) -> None:
     turned = waves[_LAST * n + _TURNED]
     for cell in range(pad.cells):
         at = _LAST * n + _CELLS + _PER_CELL * cell
-        left = -end + cell * width
-        right = -end + (cell + 1) * width if cell + 1 < pad.cells else end
-        place = waves[at + _PLACE]
+        low = -end + cell * width
+        high = -end + (cell + 1) * width if cell + 1 < pad.cells else end
+        last = waves[at + _PLACE]
         if moved < waves[at + _FREE]:
-            _turn(place > 0.0, left, y, pad, waves, contact)
+            _turn(last > 0.0, low, y, pad, waves, contact)
             continue
         if stopped(pad.signals):
             return
         if turned < waves[at + _MONOTONE]:
-            place = place if left < place < right else 0.5 * (left + right)
-            root, slope = _followed(left, right, place, y, n, waves)
+            last = last if low < last < high else 0.5 * (low + high)
+            root, slope = _halley(low, high, last, y, n, waves)
             if not math.isnan(root):
-                _turn(slope < 0.0, left, y, pad, waves, contact)
+                _turn(slope < 0.0, low, y, pad, waves, contact)
                 _turn(slope > 0.0, root, y, pad, waves, contact)
                 waves[at + _FREE] = -1.0
                 waves[at + _PLACE] = root
                 continue
-        _look(left, right, cell, y, pad, waves, contact)
+        _look(low, high, cell, y, pad, waves, contact)
     _turn(False, end, y, pad, waves, contact)
 
 
@@ -329,11 +305,11 @@ def _move(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats, wav
         waves[2 * n + i] = psi
         fourth += abs(g) * (omega * omega) * (omega * omega)
         rounding += abs(g) * (1.0 + omega * pad.half_length + abs(psi))
-    if not moved <= _ROUND * pad.crest:  # or there was nothing before
+    if not moved <= 1e3 * pad.crest:  # odometers begin anew then, or where there was nothing before
         moved = turned = 0.0
         for cell in range(pad.cells):
-            place = at + _CELLS + _PER_CELL * cell
-            waves[place + _FREE] = waves[place + _MONOTONE] = -1.0
+            cell_at = at + _CELLS + _PER_CELL * cell
+            waves[cell_at + _FREE] = waves[cell_at + _MONOTONE] = -1.0
     waves[at + _MOVED] = moved
     waves[at + _TURNED] = turned
     waves[at + _HEIGHT] = y

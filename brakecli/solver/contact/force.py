@@ -3,7 +3,7 @@
 from brakecli.solver.arrays import VECTOR, Floats
 from brakecli.solver.contact import EVALUATORS, auto, closed_form, exact, midpoint
 from brakecli.solver.kernels import entry, kernel
-from brakecli.solver.records import LAYER, Layer
+from brakecli.solver.records import Layer
 
 _CLOSED_FORM, _EXACT, _MIDPOINT = map(list(EVALUATORS).index, ("closed-form", "exact", "midpoint"))
 
@@ -25,7 +25,7 @@ def evaluate(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) 
         auto.evaluate(x, y, layer, tables, scratch)
 
 
-@entry(None, float, float, LAYER, VECTOR, VECTOR)
+@entry(None, float, float, Layer, VECTOR, VECTOR)
 def fill(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """`evaluate`, for Python."""
     evaluate(x, y, layer, tables, scratch)

@@ -23,8 +23,6 @@ from brakecli.solver.records import Layer
 from brakecli.solver.roughness import turn_to
 from brakecli.solver.sine import sine_cosine
 
-FARTHEST = 4e18
-"""Points of the grid up to which they are numbered; a motion that runs away passes it."""
 WEIGHTS = np.array([-((-1.0) ** i) * math.comb(POINTS - 1, i) / math.factorial(POINTS - 1) for i in range(POINTS)])
 """Lagrange's, without what depends on the place."""
 
@@ -72,7 +70,7 @@ def _add_five(even: Floats, odd: Floats, table: Floats, s: Floats, c: Floats) ->
 @kernel
 def eights(layer: Layer) -> int:
     """Sines of the waves, to whole lanes; as many cosines follow."""
-    return (layer.pad.wheel_terms + 7) // 8 * 8  # type: ignore[no-any-return]
+    return (layer.pad.wheel_terms + 7) // 8 * 8
 
 
 @kernel
@@ -91,21 +89,21 @@ def _turn(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
 
 
 @kernel
-def _is_known(x: float, level: int, layer: Layer) -> bool:
+def _holds(x: float, level: int, layer: Layer) -> bool:
     """Whether so much is known of a place; what is known of another one is forgotten."""
-    if x != layer.place:
-        layer.place = x
-        layer.known = 0
-    if layer.known >= level:
+    if x != layer.x:
+        layer.x = x
+        layer.level = 0
+    if layer.level >= level:
         return True
-    layer.known = level
+    layer.level = level
     return False
 
 
 @kernel
 def phases(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     """Sines and cosines of all waves where the shoe is at x; without a window."""
-    if not _is_known(x, 1, layer):
+    if not _holds(x, 1, layer):
         _turn(x, layer, tables, scratch)
 
 
@@ -196,20 +194,20 @@ def _row(point: int, layer: Layer) -> int:
     """Where the heights begin at a point of the grid and, a cell further each, at those that follow."""
     window = layer.window
     column = (point >> window.shift) - TILE * window.origin
-    return window.at + (point & (window.rows - 1)) * window.width + column  # type: ignore[no-any-return]
+    return window.at + (point & (window.rows - 1)) * window.width + column
 
 
 @kernel(fastmath=FAST)
-def _weigh(part: float, weights: Floats) -> None:
+def _weigh(p: float, weights: Floats) -> None:
     """Lagrange's weights of the points, this part of the way from the last one of the first half to the next.
 
     That of point i is Π (p - j)/(i - j) over all other points j, which lie at -n/2 + 1 … n/2.
     """
     product = 1.0
     for i in range(POINTS // 2):
-        product *= (part + i) * (part - 1.0 - i)
+        product *= (p + i) * (p - 1.0 - i)
     for i in range(POINTS):
-        weights[i] = product * WEIGHTS[i] / (part - (i - POINTS // 2 + 1))
+        weights[i] = product * WEIGHTS[i] / (p - (i - POINTS // 2 + 1))
 
 
 @kernel(fastmath=FAST)
@@ -253,14 +251,16 @@ def _interpolate(x: float, gap: Floats, f1: Floats, layer: Layer, tables: Floats
     """f2 - f1 where the shoe is at x, from the window."""
     window = layer.window
     shift = layer.window.shift
-    place = (x - window.travel) / window.spacing
-    whole = np.floor(place)
+    position = (x - window.travel) / window.spacing
+    whole = np.floor(position)
     point = whole - window.points
-    begin = (int(point) if abs(point) < FARTHEST else 0) - POINTS // 2 + 1
+    begin = (
+        (int(point) if abs(point) < 4e18 else 0) - POINTS // 2 + 1
+    )  # a motion that runs away passes all numbers
     last = (begin + POINTS - 1 >> shift) + gap.size - 1
     _cover((begin >> shift) // TILE, last // TILE, layer, tables, scratch)
     weights = scratch[window.at - POINTS : window.at]
-    _weigh(max(place - whole, 1e-200), weights)  # at no point, where it would divide by zero
+    _weigh(max(position - whole, 1e-200), weights)  # at no point, where it would divide by zero
     _add_rows(begin, weights, gap, f1, layer, scratch)
 
 
@@ -276,21 +276,21 @@ def gaps(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     f1 = tables[pad.nodes_at : pad.nodes_at + width]
     if layer.window.rows == 0:
         phases(x, layer, tables, scratch)
-        if not _is_known(x, 2, layer):
+        if not _holds(x, 2, layer):
             _place_sums(gap, f1, pad.nodes // 2 + BESIDE, layer, tables, scratch)
-    elif not _is_known(x, 2, layer):
+    elif not _holds(x, 2, layer):
         _interpolate(x, gap, f1, layer, tables, scratch)
 
 
 @kernel(fastmath=FAST)
-def _find_rises(gap: Floats, rises_of_f1: Floats, found: Floats) -> None:
+def _find_rises(gap: Floats, rises_of_f1: Floats, into: Floats) -> None:
     """f2' times a cell at the edges, by a polynomial through eight neighbours on each side."""
-    for j in range(found.size):
+    for j in range(into.size):
         one = RISE[0] * (gap[j + 9] - gap[j + 7]) + RISE[1] * (gap[j + 10] - gap[j + 6])
         two = RISE[2] * (gap[j + 11] - gap[j + 5]) + RISE[3] * (gap[j + 12] - gap[j + 4])
         three = RISE[4] * (gap[j + 13] - gap[j + 3]) + RISE[5] * (gap[j + 14] - gap[j + 2])
         four = RISE[6] * (gap[j + 15] - gap[j + 1]) + RISE[7] * (gap[j + 16] - gap[j])
-        found[j] = one + two + (three + four) + rises_of_f1[j]
+        into[j] = one + two + (three + four) + rises_of_f1[j]
 
 
 @kernel
@@ -299,6 +299,6 @@ def rises(x: float, layer: Layer, tables: Floats, scratch: Floats) -> None:
     pad = layer.pad
     edges = pad.nodes + 1
     gaps(x, layer, tables, scratch)
-    if not _is_known(x, 3, layer):
+    if not _holds(x, 3, layer):
         rises_of_f1 = tables[pad.rises_at : pad.rises_at + edges]
         _find_rises(scratch[: edges + 2 * BESIDE], rises_of_f1, scratch[pad.parts_at : pad.parts_at + edges])

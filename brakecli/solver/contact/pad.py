@@ -6,14 +6,14 @@ The constants named ..._at are where a table begins in it.
 import math
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from brakecli import stop
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact import EVALUATORS, place_of
-from brakecli.solver.records import LAYER, PAD, Layer, new
+from brakecli.solver.records import Contact, Layer, PadNumbers, new
 from brakecli.solver.roughness import Surface, height
 
 TILE = 72
@@ -31,36 +31,18 @@ With z = ωc it misses that of a sine by z^16 (8!)²/17!: 2e-15 of it with 24 ce
 
 MOST_SUMMED = 10
 """Waves of the wheel up to which their sums at all edges are as fast as a window."""
-ROWS: tuple[int, ...] = 1, 2, 4, 8, 16
-"""Points of the grid of a window to a cell."""
 POINTS = 12
-INTERPOLATED = 1e-15
-"""Points from which a height in a window is interpolated, and its largest error over the sum of amplitudes,
-which is rounding."""
-
-FEWEST_CELLS = 8.0
-CELLS_PER_WAVE = 4.0
-MOST_CELLS = 2**16
-"""Cells of the pad of which the exact contact keeps what it has found: at least, for each of the shortest waves,
-and at most."""
-BOUND_POINTS = 64
-MOST_BOUND_POINTS = 10**6
-"""Points for each of the shortest waves at which the shoe's profile is bounded, and all of them at most."""
-
+"""Points from which a height in a window is interpolated."""
 NODES = 64
 """Fewest nodes, of which all numbers of nodes are multiples; a choice."""
 
-PIECE = 100_000
-"""Pairs of waves, or nodes, that tables are made of at a time: signals are heard in between."""
-
-
-FEWEST_PER_WAVE = 4
-"""Fewest nodes to the shortest wavelength: heights at the edges of cells half a wave long know nothing of it."""
-
 
 def fewest_nodes(half_length: float, shoe: Surface, wheel: Surface) -> int:
-    """Fewest quadrature nodes, an even number as all are."""
-    return 2 * max(1, math.ceil(FEWEST_PER_WAVE * half_length * max([*shoe.turns, *wheel.turns], default=0.0)))
+    """Fewest quadrature nodes, an even number as all are.
+
+    There are four to the shortest wave: heights at the edges of cells half a wave long know nothing of it.
+    """
+    return 2 * max(1, math.ceil(4 * half_length * max([*shoe.turns, *wheel.turns], default=0.0)))
 
 
 def default_nodes(evaluator: str, half_length: float, shoe: Surface, wheel: Surface) -> int:
@@ -70,15 +52,15 @@ def default_nodes(evaluator: str, half_length: float, shoe: Surface, wheel: Surf
 
 
 class Pad(NamedTuple):
-    """Constants, a record of `PAD`, and tables of a pad on its wheel."""
+    """Constants, and tables of a pad on its wheel."""
 
-    constants: Any
+    constants: PadNumbers
     tables: Floats
 
 
 def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes: int) -> Pad:
     """The pad for stiffness k (N/m²), half length (m) and surfaces; `nodes` = 0 without quadrature tables."""
-    pad = new(PAD)
+    pad = new(PadNumbers)
     pad.k = k
     pad.half_length = half_length
     pad.nodes = nodes
@@ -86,10 +68,11 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     pad.wheel_terms = wheel.g.size
     pad.signals = np.frombuffer(stop.memory, np.uint8).ctypes.data
     top, bottom = _shoe_bounds(half_length, shoe)
-    pad.steep, pad.curved = (np.abs(wheel.g) @ wheel.omega**n for n in (1, 2))
-    cells = max(FEWEST_CELLS, CELLS_PER_WAVE * 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
+    pad.steep, pad.curved = (float(np.abs(wheel.g) @ wheel.omega**n) for n in (1, 2))
+    # cells of which the exact contact keeps what it has found: four to the shortest wave
+    cells = max(8.0, 4.0 * 2.0 * half_length * max([*shoe.turns, *wheel.turns], default=0.0))
     pad.cell = 2.0 * half_length / cells
-    pad.cells = min(math.ceil(cells), MOST_CELLS)
+    pad.cells = min(math.ceil(cells), 2**16)
     waves = wheel.g.size
     tiles = -(-(nodes // 2 + 1 + BESIDE) // TILE) if nodes else 0
     pad.columns = TILE * tiles
@@ -112,12 +95,12 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
     # Large tables are made in their place: a copy of gigabytes would not hear a signal.
     flat = aligned(sum(map(math.prod, shapes.values())))
     table = dict[str, Floats]()
-    place = 0
+    begin = 0
     for name, shape in shapes.items():
-        pad[name] = place
+        setattr(pad, name, begin)
         size = math.prod(shape)
-        table[name] = flat[place : place + size].reshape(shape)
-        place += size
+        table[name] = flat[begin : begin + size].reshape(shape)
+        begin += size
     table["gap_at"][:] = np.concatenate(
         [wheel.g, -shoe.g, wheel.omega, shoe.omega, np.zeros(waves), shoe.phase],
     )
@@ -132,11 +115,11 @@ def build_pad(k: float, half_length: float, shoe: Surface, wheel: Surface, nodes
         _edge_tables(cell, flattened(shoe, cell), flattened(wheel, cell), table["nodes_at"], table["waves_at"])
         wheel = flattened(wheel, cell)
         turns = np.sin(np.outer(np.arange(1.0, BESIDE + 1.0), wheel.omega * cell))
-        pad.rise_error = np.abs(wheel.g) @ np.abs(wheel.omega - 2.0 * np.array(RISE) @ turns / cell)
+        pad.rise_error = float(np.abs(wheel.g) @ np.abs(wheel.omega - 2.0 * np.array(RISE) @ turns / cell))
         f1 = table["nodes_at"][BESIDE:-BESIDE]
-        for i, part in enumerate(RISE, 1):
+        for i, weight in enumerate(RISE, 1):
             ahead, behind = (table["nodes_at"][BESIDE + n :][: nodes + 1] for n in (i, -i))
-            table["rises_at"][:] += part * (ahead - behind)
+            table["rises_at"][:] += weight * (ahead - behind)
         top = max(top, float(f1.max()))
         bottom = max(bottom, float(-f1.min()))
     pad.shoe_bound = max(top, bottom)
@@ -171,9 +154,9 @@ def window_rows(wheel: Surface, spacing: float) -> int:
     """Points of a window's grid to a cell of this length (m); 0 without window: few waves, or too short ones."""
     if wheel.g.size <= MOST_SUMMED:
         return 0
-    allowed = INTERPOLATED * float(np.abs(wheel.g).sum())
+    allowed = 1e-15 * float(np.abs(wheel.g).sum())  # rounding
     wheel = flattened(wheel, spacing)
-    return next((rows for rows in ROWS if interpolation_error(wheel, spacing / rows) <= allowed), 0)
+    return next((rows for rows in (1, 2, 4, 8, 16) if interpolation_error(wheel, spacing / rows) <= allowed), 0)
 
 
 def window_width(nodes: int) -> int:
@@ -182,15 +165,15 @@ def window_width(nodes: int) -> int:
 
 
 class ContactLayer(NamedTuple):
-    """The springs of a pad: a record of `LAYER`, and the two arrays that its kernels get with it."""
+    """The springs of a pad: a record of `Layer`, and the two arrays that its kernels get with it."""
 
     layer: Layer
     tables: Floats
     scratch: Floats
 
     @property
-    def contact(self) -> Any:
-        """What the last evaluation has found, a record of `CONTACT`."""
+    def contact(self) -> Contact:
+        """The contact of the last evaluation."""
         return self.layer.contact
 
     @property
@@ -207,7 +190,7 @@ def build_layer(evaluator: str, pad: Pad, *, moving: bool = False, room: int = 0
     """
     constants, tables = pad
     waves = constants.shoe_terms + constants.wheel_terms
-    layer = new(LAYER)
+    layer = new(Layer)
     layer.evaluator = place_of(evaluator)
     layer.pad = constants
     window = layer.window
@@ -236,13 +219,12 @@ def aligned(size: int) -> Floats:
 def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
     """Upper bounds (m) of f1 and of -f1 on the pad: a fine grid and what curvature can add between its points.
 
+    It has 64 points to the shortest wave.
     They take as long as a short run, and are those of other nodes as well.
     """
     if shoe.g.size == 0:
         return 0.0, 0.0
-    xi = np.linspace(
-        -a, a, min(1 + BOUND_POINTS * max(1, math.ceil(2.0 * a * max(shoe.turns))), MOST_BOUND_POINTS)
-    )
+    xi = np.linspace(-a, a, min(1 + 64 * max(1, math.ceil(2.0 * a * max(shoe.turns))), 10**6))
     f = height(shoe, xi)
     between = float(np.abs(shoe.g) @ shoe.omega**2) * (xi[1] - xi[0]) ** 2 / 8.0
     crest = float(np.abs(shoe.g).sum())
@@ -251,7 +233,7 @@ def _shoe_bounds(a: float, shoe: Surface) -> tuple[float, float]:
 
 def _pieces(rows: int, wide: int = 1) -> Iterator[slice]:
     """Rows of `wide` columns, by pieces between which a signal is heard."""
-    step = 1 + PIECE // (1 + wide)
+    step = 1 + 100_000 // (1 + wide)  # pairs of waves, or nodes
     return (slice(i, min(i + step, rows)) for i in range(0, rows, step))
 
 
@@ -259,14 +241,14 @@ def _edge_tables(cell: float, shoe: Surface, wheel: Surface, f1: Floats, waves: 
     """f1 at all edges, with edges beyond both ends, and g sin(omega xi), g cos(omega xi) of the wheel at those
     from the middle on: by tiles, waves, sine and cosine, and edges.
     """
-    for part in _pieces(f1.size):
-        xi = cell * (np.arange(part.start, part.stop) - f1.size // 2)
+    for piece in _pieces(f1.size):
+        xi = cell * (np.arange(piece.start, piece.stop) - f1.size // 2)
         for g, omega, phase in zip(shoe.g, shoe.omega, shoe.phase, strict=True):
-            f1[part] += g * np.sin(omega * xi + phase)
-    for part in _pieces(len(waves), TILE):
-        xi = cell * np.arange(TILE * part.start, TILE * part.stop)
+            f1[piece] += g * np.sin(omega * xi + phase)
+    for piece in _pieces(len(waves), TILE):
+        xi = cell * np.arange(TILE * piece.start, TILE * piece.stop)
         for i, (g, omega) in enumerate(zip(wheel.g, wheel.omega, strict=True)):
-            waves[part, i] = np.stack([g * f(omega * xi).reshape(-1, TILE) for f in (np.sin, np.cos)], 1)
+            waves[piece, i] = np.stack([g * f(omega * xi).reshape(-1, TILE) for f in (np.sin, np.cos)], 1)
 
 
 def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Floats]) -> tuple[Floats, float, float]:
@@ -278,12 +260,12 @@ def _products(a: float, shoe: Surface, wheel: Surface, into: tuple[Floats, Float
 
     def pair(f: Surface, h: Surface, sines: Floats, cosines: Floats) -> None:
         """∫ sin sin and ∫ cos cos."""
-        for part in _pieces(f.g.size, h.g.size):
-            minus = np.sinc(np.subtract.outer(f.omega[part], h.omega) * a / np.pi)
-            plus = np.sinc(np.add.outer(f.omega[part], h.omega) * a / np.pi)
-            g = a * np.outer(f.g[part], h.g)
-            sines[part] = g * (minus - plus)
-            cosines[part] = g * (minus + plus)
+        for piece in _pieces(f.g.size, h.g.size):
+            minus = np.sinc(np.subtract.outer(f.omega[piece], h.omega) * a / np.pi)
+            plus = np.sinc(np.add.outer(f.omega[piece], h.omega) * a / np.pi)
+            g = a * np.outer(f.g[piece], h.g)
+            sines[piece] = g * (minus - plus)
+            cosines[piece] = g * (minus + plus)
 
     sin_1 = np.sin(shoe.phase)
     cos_1 = np.cos(shoe.phase)

@@ -7,12 +7,11 @@ Of the nodes it is what `contact.midpoint.left_out` finds at every second level.
 """
 
 import math
-from typing import Any
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
 from brakecli.solver.lanes.contact import leave_out
-from brakecli.solver.lanes.records import ALIKE, LANES, Shared
+from brakecli.solver.lanes.records import ALIKE, LANES, Lane, Levels, Shared
 from brakecli.solver.lanes.steps import THETA_1, forces, move, prepare, solve, some
 from brakecli.solver.records import PARTS
 from brakecli.solver.tangent import LEAST, MOST
@@ -24,7 +23,7 @@ NEAR = 3.0
 
 
 @kernel(fastmath=ALIKE)
-def _miss(o: Any, shared: Shared) -> None:
+def _miss(o: Lane, shared: Shared) -> None:
     """What the motion misses of (6) and (7) with steps twice as long, between the last three even levels.
 
     The source is 2/7 of g + θ1 (φ, 1) F^{n+1} - a w.
@@ -46,7 +45,7 @@ def _miss(o: Any, shared: Shared) -> None:
 
 
 @kernel(fastmath=ALIKE)
-def _begin(o: Any, shared: Shared) -> None:
+def _begin(o: Lane, shared: Shared) -> None:
     """At the second level: the error of the first one, by a start with a step h twice as long.
 
     It is 1/14 of z⁰ + h v⁰ + h² (2a⁰ + a¹)/6 - z¹.
@@ -63,14 +62,14 @@ def _begin(o: Any, shared: Shared) -> None:
         e = shared.rate * (s.y[n] - y) - v_y
         force = 2.0 * c.force[n] + s.force[n]
         f_x, f_y = forces(o, n, 2.0 * x + s.x[n], 2.0 * y + s.y[n], 2.0 * v_x + d, 2.0 * v_y + e, force)
-        part = h * h / 6.0 / o.m[n]
-        o.by_steps.x[n] += (x + h * v_x + part * (f_x + 3.0 * s.source_x[n]) - s.x[n]) / _START
-        o.by_steps.y[n] += (y + h * v_y + part * (f_y + 3.0 * s.source_y[n]) - s.y[n]) / _START
+        factor = h * h / 6.0 / o.m[n]
+        o.by_steps.x[n] += (x + h * v_x + factor * (f_x + 3.0 * s.source_x[n]) - s.x[n]) / _START
+        o.by_steps.y[n] += (y + h * v_y + factor * (f_y + 3.0 * s.source_y[n]) - s.y[n]) / _START
         move(c, n, s.x[n], s.y[n], v_x, v_y, s.force[n])
 
 
 @kernel(fastmath=ALIKE)
-def _contact(o: Any, shared: Shared, n: int) -> None:
+def _contact(o: Lane, shared: Shared, n: int) -> None:
     """The derivative of the contact force at the older level of the motion.
 
     Along the motion dF_y/dt = ∂F_y/∂x (v_x - U) + ∂F_y/∂y v_y. This gives ∂F_y/∂x without another sum over nodes,
@@ -89,7 +88,7 @@ def _contact(o: Any, shared: Shared, n: int) -> None:
 
 
 @kernel(fastmath=ALIKE)
-def _go_on(o: Any, shared: Shared, s: Any, n: int, own: float) -> None:
+def _go_on(o: Lane, shared: Shared, s: Levels, n: int, own: float) -> None:
     """Carry one of them to the older level of the motion, by the derivative of its steps.
 
     It is the step for (δx, δy) with its own sources, where δF_y = ∂F_y/∂x δx + ∂F_y/∂y δy is solved for; `own` is
@@ -103,7 +102,7 @@ def _go_on(o: Any, shared: Shared, s: Any, n: int, own: float) -> None:
 
 
 @kernel(fastmath=ALIKE)
-def _note(o: Any, n: int, component: int, by_steps: float, by_nodes: float) -> float:
+def _note(o: Lane, n: int, component: int, by_steps: float, by_nodes: float) -> float:
     """The largest errors of a component; the sum of both.
 
     That of the nodes is known from every second level, by chance too large or too small: it takes nothing off that
@@ -118,7 +117,7 @@ def _note(o: Any, n: int, component: int, by_steps: float, by_nodes: float) -> f
 
 
 @kernel(inline=False)
-def carry(o: Any, shared: Shared, gaps: Floats, step: int) -> None:
+def carry(o: Lane, shared: Shared, gaps: Floats, step: int) -> None:
     """Carry all that is carried along to the older level of the motion, behind a step that has been made."""
     even = step % 2 == 0
     if even and step > 0:
@@ -148,13 +147,13 @@ def carry(o: Any, shared: Shared, gaps: Floats, step: int) -> None:
 
 
 @kernel(inline=False)
-def renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> None:
+def renew(o: Lane, shared: Shared, sizes: Floats, number: int, samples: int) -> None:
     """At a sample that ends a part of the run, note the growth, and go on with disturbances of size one.
 
     The square of a size is twice the energy over the mass where the pad touches everywhere. It hardly swings then.
     """
-    part = (number - 1) * PARTS // samples
-    if number == 0 or (number < samples and number * PARTS // samples == part):
+    row = (number - 1) * PARTS // samples
+    if number == 0 or (number < samples and number * PARTS // samples == row):
         return
     s = o.disturbed
     for n in range(LANES):
@@ -162,8 +161,8 @@ def renew(o: Any, shared: Shared, sizes: Floats, number: int, samples: int) -> N
         y = s.y_old[n]
         springs = o.c_xx[n] * x * x + 2.0 * o.c_xy[n] * x * y + (o.c_yy[n] + o.k[n] * shared.length) * y * y
         size = math.sqrt(max(springs, 0.0) / o.m[n] + s.d[n] * s.d[n] + s.e[n] * s.e[n])
-        sizes[part, n] = min(max(size, LEAST), MOST)
-        o.kept[n] = 1.0 / sizes[part, n]
-    for each in (s.x, s.y, s.x_old, s.y_old, s.d, s.e, s.d_old, s.e_old, s.force, s.before):
+        sizes[row, n] = min(max(size, LEAST), MOST)
+        o.shrink[n] = 1.0 / sizes[row, n]
+    for values in (s.x, s.y, s.x_old, s.y_old, s.d, s.e, s.d_old, s.e_old, s.force, s.before):
         for n in range(LANES):
-            each[n] *= o.kept[n]
+            values[n] *= o.shrink[n]

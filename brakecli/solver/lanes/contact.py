@@ -1,13 +1,12 @@
 """The contact of all lanes: the normal force, (2), and what nodes leave out of it."""
 
 import math
-from typing import Any
 
 import numpy as np
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
-from brakecli.solver.lanes.records import ALIKE, LANES, WAVES, Shared
+from brakecli.solver.lanes.records import ALIKE, LANES, WAVES, Lane, Shared
 from brakecli.solver.lanes.steps import some
 from brakecli.solver.roughness import TWO_PI
 from brakecli.solver.sine import sine_cosine
@@ -23,14 +22,14 @@ def _sum(waves: Floats, n: int, table: Floats, j: int, first: int) -> float:
 
 
 @kernel(fastmath=ALIKE)
-def _add_nodes(o: Any, table: Floats, gaps: Floats) -> None:
+def _add_nodes(o: Lane, table: Floats, gaps: Floats) -> None:
     """The midpoint sum of the gaps (m), how many nodes touch, and the gaps themselves.
 
     The gap at ξ is f2 - f1 - y, where f2 = Σ g (sin cos ωξ + cos sin ωξ) by the sine and cosine of each wave. What
     is even in ξ and what is odd give the gaps at ξ and -ξ from the table of one node.
     """
     for n in range(LANES):
-        o.found[n] = o.touches[n] = 0.0
+        o.at_force[n] = o.touches[n] = 0.0
     for j in range(table.shape[0]):
         f1 = table[j, 0]
         opposite = table[j, 1]
@@ -39,14 +38,14 @@ def _add_nodes(o: Any, table: Floats, gaps: Floats) -> None:
             even = _sum(o.sine, n, table, j, 2 + WAVES) - o.at_y[n]
             one = even + odd - f1
             other = even - odd - opposite
-            o.found[n] += (one if one > 0.0 else 0.0) + (other if other > 0.0 else 0.0)
+            o.at_force[n] += (one if one > 0.0 else 0.0) + (other if other > 0.0 else 0.0)
             o.touches[n] += (1.0 if one > 0.0 else 0.0) + (1.0 if other > 0.0 else 0.0)
             gaps[j + 2, n] = one
             gaps[j + 2, LANES + n] = other
 
 
 @kernel(fastmath=ALIKE, inline=False)
-def touch(o: Any, shared: Shared, table: Floats, gaps: Floats, t: float) -> None:
+def touch(o: Lane, shared: Shared, table: Floats, gaps: Floats, t: float) -> None:
     """The normal force, and the part that touches: in closed form where a bound proves it, or by nodes.
 
     F_y = k ∫ max(f2 - f1 - y, 0) dξ; of a pad that touches everywhere it is k (Σ wave sin - length (y + mean f1)).
@@ -67,12 +66,12 @@ def touch(o: Any, shared: Shared, table: Floats, gaps: Floats, t: float) -> None
         o.partly[n] = 1.0 if full < o.at_y[n] and o.at_y[n] < clear else 0.0
     if some(o.partly):
         _add_nodes(o, table, gaps)
-    part = 1.0 / shared.nodes
+    weight = 1.0 / shared.nodes
     for n in range(LANES):
         whole = _sum(o.sine, n, shared.waves, 2, 0) - length * (o.at_y[n] + mean)
         closed = whole if whole > 0.0 and o.at_y[n] <= full else 0.0
-        o.found[n] = o.k[n] * (length * part * o.found[n] if o.partly[n] > 0.0 else closed)
-        o.touches[n] = part * o.touches[n] if o.partly[n] > 0.0 else 1.0 if o.at_y[n] <= full else 0.0
+        o.at_force[n] = o.k[n] * (length * weight * o.at_force[n] if o.partly[n] > 0.0 else closed)
+        o.touches[n] = weight * o.touches[n] if o.partly[n] > 0.0 else 1.0 if o.at_y[n] <= full else 0.0
 
 
 @kernel(fastmath=ALIKE)
@@ -111,7 +110,7 @@ def _cut(gaps: Floats, j: int, n: int) -> tuple[float, float]:
 
 
 @kernel(fastmath=ALIKE, inline=False)
-def leave_out(o: Any, gaps: Floats, spacing: float) -> None:
+def leave_out(o: Lane, gaps: Floats, spacing: float) -> None:
     """`contact.midpoint.left_out` of pads that touch in part, where the contact was evaluated last.
 
     From both ends to the middle, where both halves find an edge: a pair of two such cells takes one division.

@@ -5,17 +5,16 @@ three levels. `steps.three_layer` computes the force at weighted positions, and 
 That is right to h² only; here errors fall with h³.
 """
 
-from typing import Any
-
+from brakecli.solver.arrays import Floats
 from brakecli.solver.kernels import kernel
-from brakecli.solver.lanes.records import ALIKE
+from brakecli.solver.lanes.records import ALIKE, Lane, Levels
 from brakecli.solver.schemes import NUMEROV
 
 THETA_1, THETA_2, THETA_3 = NUMEROV
 
 
 @kernel(fastmath=ALIKE)
-def forces(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, force: float) -> tuple[float, float]:
+def forces(o: Lane, n: int, x: float, y: float, v_x: float, v_y: float, force: float) -> tuple[float, float]:
     """What acts by (6) and (7), without the load, N."""
     f_x = o.grip[n] * force - o.b_xx[n] * v_x - o.b_xy[n] * v_y - o.c_xx[n] * x - o.c_xy[n] * y
     f_y = force - o.b_xy[n] * v_x - o.b_yy[n] * v_y - o.c_xy[n] * x - o.c_yy[n] * y
@@ -23,7 +22,7 @@ def forces(o: Any, n: int, x: float, y: float, v_x: float, v_y: float, force: fl
 
 
 @kernel(fastmath=ALIKE)
-def prepare(o: Any, s: Any, n: int, rate: float) -> None:
+def prepare(o: Lane, s: Levels, n: int, rate: float) -> None:
     """The known part of (6) and (7) over three levels; `rate` is 1/h.
 
     With z = (x, y), w = (d, e) and the forces F = (φF_y, F_y) it is g = 2m (z^n - z^{n-1})/h² - C (θ2 z^n +
@@ -41,7 +40,7 @@ def prepare(o: Any, s: Any, n: int, rate: float) -> None:
 
 
 @kernel(fastmath=ALIKE)
-def solve(o: Any, s: Any, n: int, h: float, force: float) -> tuple[float, float, float, float]:
+def solve(o: Lane, s: Levels, n: int, h: float, force: float) -> tuple[float, float, float, float]:
     """z^{n+1} = z^{n-1} + 2h w and w = a⁻¹ (g + θ1 (φ, 1) F), by (15) and (16)."""
     f_x = s.g_1[n] + THETA_1 * o.grip[n] * force
     f_y = s.g_2[n] + THETA_1 * force
@@ -51,7 +50,7 @@ def solve(o: Any, s: Any, n: int, h: float, force: float) -> tuple[float, float,
 
 
 @kernel(fastmath=ALIKE)
-def move(s: Any, n: int, x: float, y: float, d: float, e: float, force: float) -> None:
+def move(s: Levels, n: int, x: float, y: float, d: float, e: float, force: float) -> None:
     """Go on to the next level."""
     s.x_old[n] = s.x[n]
     s.y_old[n] = s.y[n]
@@ -66,9 +65,9 @@ def move(s: Any, n: int, x: float, y: float, d: float, e: float, force: float) -
 
 
 @kernel
-def some(flags: Any) -> bool:
+def some(flags: Floats) -> bool:
     """Whether a flag of any lane is set."""
-    found = 0
+    is_set = 0
     for n in range(flags.size):
-        found |= 1 if flags[n] > 0.0 else 0
-    return found > 0
+        is_set |= 1 if flags[n] > 0.0 else 0
+    return is_set > 0

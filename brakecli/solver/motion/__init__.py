@@ -4,7 +4,7 @@
 rough contact: `steps` chooses each step by its error, `between` loops over them from sample to sample, and `grid`
 takes a fixed number. Whoever fills the record (`samples`, `between`, `flow`) sets `propagator`.
 
-A propagator carries the block of a motion (`block.BLOCK`) from event to event.
+A propagator carries the block of a motion (`block.Block`) from event to event.
 
 1. The motion that is reached stands in `z`, with U, Q and their slopes, in the phase `phase`, at `base` + `time`.
 2. A step lies within a phase, and between two knots of speed and load.

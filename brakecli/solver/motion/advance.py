@@ -27,12 +27,8 @@ from brakecli.solver.motion.locate import NO_EVENT, first_event
 from brakecli.solver.phases import OPEN, sliding_phase
 from brakecli.solver.plant import Plant
 
-MOST_STEPS = 100_000
-"""Steps of a call: Python hears signals in between."""
 _WHOLE = 1e-12
 """Part of a step by which a stop may lie before or behind its end."""
-_KEPT = 4096
-"""Steps from one sum of the works to the next, so that rounding does not add up."""
 
 
 @kernel(inline=False)
@@ -63,22 +59,22 @@ def _note(p: Plant, scratch: Floats) -> None:
 
 
 @kernel(inline=False)
-def _part_step(p: Plant, scratch: Floats, left: float) -> int:
+def _part_step(p: Plant, scratch: Floats, remaining: float) -> int:
     """Take a step on the series, up to an event, a knot or the stop; how a call ends there, or `DONE`."""
     m = p.block
     e = p.exact
     to_knot = m.knot - m.base - m.time
-    m.span = max(min(m.h, left, to_knot), 0.0)
+    m.span = max(min(m.h, remaining, to_knot), 0.0)
     exact.expand(e, m.z, m.phase, m.span)
-    m.which, m.part = first_event(e, m.phase, p.c.m, m.span)
-    if m.part > 0.0:
+    m.which, m.taken = first_event(e, m.phase, p.c.m, m.span)
+    if m.taken > 0.0:
         if m.account == 1:
             exact.part_works(p.c, e, m, p.work)
-        exact.reach(e, m.part)
+        exact.reach(e, m.taken)
         for i in range(SIZE):
             m.z[i] = e.at[i]
         columns.carry_part(e, m)
-    m.time += m.part * m.span
+    m.time += m.taken * m.span
     if m.which == NO_EVENT:
         if to_knot <= m.span:
             exact.add_works(p.c, e, m, p.work)
@@ -104,9 +100,9 @@ def advance(p: Plant, scratch: Floats, until: float, turns: bool) -> int:
     """
     m = p.block
     e = p.exact
-    for _ in range(MOST_STEPS):
-        left = until - m.time
-        if not left > 0.0:
+    for _ in range(100_000):  # Python hears signals in between
+        remaining = until - m.time
+        if not remaining > 0.0:
             return DONE
         for i in range(4):
             m.begin[i] = m.z[i]
@@ -121,22 +117,22 @@ def advance(p: Plant, scratch: Floats, until: float, turns: bool) -> int:
         if m.phase != OPEN:
             p.counts.evaluations += 1
             p.counts.most = 1
-        rest = left - m.h
+        beyond = remaining - m.h
         ends = DONE
-        if rest >= -_WHOLE * m.h and m.base + m.time + m.h < m.knot and exact.try_whole_step(e, m):
+        if beyond >= -_WHOLE * m.h and m.base + m.time + m.h < m.knot and exact.try_whole_step(e, m):
             m.which = NO_EVENT
             m.span = m.h
-            m.part = 1.0
+            m.taken = 1.0
             m.time += m.h
             if m.account == 1:
                 exact.add_products(e, m)
-                if m.waiting == _KEPT:
+                if m.waiting == 4096:  # so that rounding does not add up
                     exact.add_works(p.c, e, m, p.work)
             columns.carry(e, m)
             if m.measures == 1 or (p.track.on == 1 and not m.z[V_X] * p.track.way > 0.0):
                 _note(p, scratch)
         else:
-            ends = _part_step(p, scratch, left)
+            ends = _part_step(p, scratch, remaining)
         if m.which == NO_EVENT and until - m.time <= _WHOLE * m.h:
             m.time = until
         if turns and m.begin[V_X] * m.z[V_X] <= 0.0 and m.begin[V_X] != 0.0:

@@ -14,14 +14,6 @@ from brakecli.solver.phases import OPEN, STICK
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import Failure
 
-_BUDGET = 4096
-_EXACT = 64
-"""Steps of one call on smooth surfaces, and as how many one counts that finds patches. An interruption need not
-wait for a sample."""
-_PAIRS = 2000
-_PAIRS_EXACT = 3
-"""Pairs of waves that take as long as a step on smooth surfaces, in full contact and where patches are found."""
-
 _NONE = int(Failure.NONE)
 _COARSE = int(Failure.COARSE)
 
@@ -37,19 +29,19 @@ def _sample(p: Plant, tables: Floats, scratch: Floats, level: int) -> None:
     belt = m.z[BELT]
     belt_slope = m.z[BELT_SLOPE]
     load = m.z[LOAD]
-    rest = 0.0  # until the motion reached
+    ahead = 0.0  # until the motion reached
     for i in range(4):
         r.w[i] = m.z[i]
     if r.level > level or m.time > ROUNDING * t:
         m.phase = m.old
         since = (t - r.base) - r.time
-        rest = (m.base - t) + m.time
+        ahead = (m.base - t) + m.time
         belt_slope = r.outside[BELT_SLOPE - BELT]
         belt = r.outside[0] + belt_slope * since
         load = r.outside[LOAD - BELT] + r.outside[LOAD_SLOPE - BELT] * since
         for i in range(4):
             r.w[i] = interpolated(r, i, since / r.length)
-    passes = (belt + 0.5 * belt_slope * rest) * rest  # by the wheel until then
+    passes = (belt + 0.5 * belt_slope * ahead) * ahead  # by the wheel until then
     at = r.w[X] + passes
     if m.phase == STICK:
         at = m.z[X]
@@ -101,13 +93,14 @@ def sampled_between(p: Plant, tables: Floats, scratch: Floats, rows: Floats, sto
             _sample(p, tables, scratch, counts.level)
             if p.tangent.on == 1:
                 renew_disturbance(p, counts.level)
-        if counts.level == stop or steps >= _BUDGET:
+        if counts.level == stop or steps >= 4096:  # an interruption need not wait for a sample
             break
         failure = step(p, tables, scratch)
         if p.tangent.beyond == 1:
             failure = _COARSE
         smooth = p.layer.contact.kind == CLOSED_FORM
-        steps += 1 + waves * waves // _PAIRS if smooth else _EXACT + waves * waves // _PAIRS_EXACT
+        # pairs of waves take as long as a step on smooth surfaces; one that finds patches takes 64 times as long
+        steps += 1 + waves * waves // 2000 if smooth else 64 + waves * waves // 3
         if failure != _NONE:
             for column in range(rows.shape[1]):
                 rows[row, column] = m.row[column]

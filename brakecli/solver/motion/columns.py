@@ -13,21 +13,17 @@ lost or made, no force jumps: f' = f, and it is the identity.
 """
 
 import math
-from typing import Any
 
-from brakecli.solver.block import COLUMNS, MATRICES, RUNGE_KUTTA, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.block import COLUMNS, MATRICES, RUNGE_KUTTA, TERMS, V_X, V_Y, Block, Exact, X, Y
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, forces
 from brakecli.solver.phases import STICK
 from brakecli.solver.plant import Plant
 
-_ERROR_TERMS = 9
-"""Terms of the series of an error and of a disturbance beside it, which are known to a few digits only."""
-
 
 @kernel
-def identify(m: Any) -> None:
+def identify(m: Block) -> None:
     """Begin with the columns of the derivative of a state by itself."""
     for j in range(m.count):
         for i in range(4):
@@ -35,7 +31,7 @@ def identify(m: Any) -> None:
 
 
 @kernel
-def carry(e: Any, m: Any) -> None:
+def carry(e: Exact, m: Block) -> None:
     """Move the columns along a whole step."""
     a = e.now
     for j in range(COLUMNS):  # a number that is known has the compiler make vectors
@@ -58,9 +54,9 @@ def carry(e: Any, m: Any) -> None:
 
 
 @kernel(inline=False)
-def carry_part(e: Any, m: Any) -> None:
+def carry_part(e: Exact, m: Block) -> None:
     """Move the columns along the part of the last step that has been taken: Σ (A s)^k w/k!, s in seconds."""
-    seconds = m.part * m.span
+    seconds = m.taken * m.span
     for j in range(m.count):
         x = m.columns[j, X]
         y = m.columns[j, Y]
@@ -70,13 +66,14 @@ def carry_part(e: Any, m: Any) -> None:
         moved_y = y
         moved_v_x = v_x
         moved_v_y = v_y
-        for k in range(1, _ERROR_TERMS if m.rounds == 1 else TERMS):
+        # an error, and a disturbance beside it, are known to a few digits only
+        for k in range(1, 9 if m.rounds == 1 else TERMS):
             a_x, a_y = exact.acceleration(e, m.old, x, y, v_x, v_y)
-            part = seconds / k
-            x = part * v_x
-            y = part * v_y
-            v_x = part * a_x
-            v_y = part * a_y
+            factor = seconds / k
+            x = factor * v_x
+            y = factor * v_y
+            v_x = factor * a_x
+            v_y = factor * a_y
             moved_x += x
             moved_y += y
             moved_v_x += v_x
@@ -90,7 +87,7 @@ def carry_part(e: Any, m: Any) -> None:
 
 
 @kernel
-def _round(e: Any, m: Any) -> None:
+def _round(e: Exact, m: Block) -> None:
     """Add a bound of the rounding of a step to the error, ε Σ |z_i now_ik|, with the signs that do most harm."""
     a = e.now
     x = m.begin[X]
@@ -98,8 +95,8 @@ def _round(e: Any, m: Any) -> None:
     v_x = m.begin[V_X]
     v_y = m.begin[V_Y]
     for i in range(4):
-        place = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
-        m.columns[0, i] += math.copysign(ROUNDING * (place + e.noise[i]), m.columns[0, i])
+        size = (abs(a[X, i] * x) + abs(a[Y, i] * y)) + (abs(a[V_X, i] * v_x) + abs(a[V_Y, i] * v_y))
+        m.columns[0, i] += math.copysign(ROUNDING * (size + e.noise[i]), m.columns[0, i])
 
 
 @kernel(inline=False)
@@ -119,7 +116,7 @@ def jump(p: Plant) -> bool:
 
 
 @kernel
-def hold_on(m: Any) -> None:
+def hold_on(m: Block) -> None:
     """In stick nothing is left of the error of ẋ, nor of what a disturbance beside it has there."""
     if m.phase == STICK and (m.rounds == 1 or m.propagator == RUNGE_KUTTA):
         for j in range(m.count):

@@ -15,17 +15,6 @@ from brakecli.solver.plant import Plant
 LOOKS = 8
 """Places of a step at which the margins are looked at; a step is at most two radians of the fastest motion."""
 
-_NEAR = 1e-12
-"""What is left of a step at the root of a margin on the continuous solution: the true motion makes it exact."""
-_APART = 0.05
-"""Part of a step over which a margin bends."""
-_MOST_STEPS = 60
-"""Steps of the search for a root; halving alone takes 40."""
-_SOUGHT = 8
-"""Places at which a margin that begins at zero is sought above it."""
-_OFF = 0.01
-"""What a margin may differ by from the cubic between two looks, over its changes by its rates at both."""
-
 
 @kernel(inline=False)
 def _see(p: Plant, theta: float) -> None:
@@ -66,25 +55,25 @@ def _allowances(p: Plant) -> tuple[float, float, float]:
 
 
 @kernel(inline=False)
-def _root(p: Plant, which: int, left: float, right: float) -> float:
+def _root(p: Plant, which: int, low: float, high: float) -> float:
     """Where a margin falls through zero between left and right: Newton's iteration, kept in the bracket."""
     r = p.runge
-    place = 0.5 * (left + right)
-    for _ in range(_MOST_STEPS):
-        _see(p, place)
+    theta = 0.5 * (low + high)
+    for _ in range(60):  # halving alone takes 40
+        _see(p, theta)
         value = r.margin[which]
         rate = r.length * r.margin_rate[which]
         if value > 0.0:
-            left = place
+            low = theta
         else:
-            right = place
-        new = place - value / rate if rate < 0.0 else left
-        if not left < new < right:
-            new = 0.5 * (left + right)
-        if abs(new - place) <= _NEAR * right:
+            high = theta
+        new = theta - value / rate if rate < 0.0 else low
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if abs(new - theta) <= 1e-12 * high:  # the true motion makes it exact
             return new
-        place = new
-    return place
+        theta = new
+    return theta
 
 
 @kernel(inline=False)
@@ -94,7 +83,7 @@ def _depth(p: Plant, which: int, root: float) -> float:
     With the rates m' at the root and m_1' a time τ before it that is m'² τ / 2(m' - m_1').
     """
     r = p.runge
-    apart = min(root, _APART)
+    apart = min(root, 0.05)  # part of a step over which the margin bends
     _see(p, root - apart)
     before = r.margin_rate[which]
     _see(p, root)
@@ -106,17 +95,17 @@ def _depth(p: Plant, which: int, root: float) -> float:
 @kernel(inline=False)
 def _above(p: Plant, which: int, right: float, allowed: float) -> float:
     """Where a margin that begins at zero is positive before it is negative at `right`; 0 where it never is."""
-    place = right
-    for _ in range(_SOUGHT):
-        place *= SOONER
-        _see(p, place)
+    theta = right
+    for _ in range(8):
+        theta *= SOONER
+        _see(p, theta)
         if p.runge.margin[which] > allowed:
-            return place
+            return theta
     return 0.0
 
 
 @kernel(inline=False)
-def _below(p: Plant, which: int, left: float, allowed: float, near: float) -> float:
+def _below(p: Plant, which: int, first: float, allowed: float, near: float) -> float:
     """Where a margin is negative between two looks, or 0: at the second one, or where it is lowest in between.
 
     How low it gets without an event is kept, unless it begins at zero.
@@ -125,18 +114,19 @@ def _below(p: Plant, which: int, left: float, allowed: float, near: float) -> fl
     begin = r.first_margin[which]
     end = r.last_margin[which]
     if end < -allowed:
-        return left + 1.0 / LOOKS
+        return first + 1.0 / LOOKS
     width = r.length / LOOKS
     fall = width * r.first_rate[which]
     rise = width * r.last_rate[which]
-    part, value = lowest(begin, fall, end, rise)
-    if part < 0.0 or value > allowed + near + _OFF * (abs(fall) + abs(rise)):
+    share, value = lowest(begin, fall, end, rise)
+    # the margin may leave the cubic by a part of its changes by the rates at both looks
+    if share < 0.0 or value > allowed + near + 0.01 * (abs(fall) + abs(rise)):
         return 0.0
-    place = left + part / LOOKS
-    _see(p, place)
+    theta = first + share / LOOKS
+    _see(p, theta)
     value = r.margin[which]
     if value < -allowed:
-        return place
+        return theta
     if which != HEIGHT and begin > allowed:
         r.lowest = min(r.lowest, value)
     return 0.0
@@ -160,33 +150,33 @@ def crossing(p: Plant, h: float) -> tuple[int, float]:
     if stays and (m.phase == OPEN or (m.phase != STICK and sliding > far)):
         return NO_EVENT, 1.0
     allowed = _allowances(p)
-    found = NO_EVENT
+    event = NO_EVENT
     first = 1.0
     _see(p, 0.0)
     for look in range(LOOKS):
-        left = look / LOOKS
+        begin = look / LOOKS
         for which in range(MARGINS):
             r.first_margin[which] = r.margin[which] if look == 0 else r.last_margin[which]
             r.first_rate[which] = r.margin_rate[which] if look == 0 else r.last_rate[which]
-        _see(p, left + 1.0 / LOOKS)
+        _see(p, begin + 1.0 / LOOKS)
         for which in range(MARGINS):
             r.last_margin[which] = r.margin[which]
             r.last_rate[which] = r.margin_rate[which]
         for which in range(MARGINS):
-            right = _below(p, which, left, allowed[which], near)
-            if right == 0.0:
+            below = _below(p, which, begin, allowed[which], near)
+            if below == 0.0:
                 continue
-            start = left
+            start = begin
             if look == 0 and r.first_margin[which] <= allowed[which]:
-                start = _above(p, which, right, allowed[which])
+                start = _above(p, which, below, allowed[which])
                 if start == 0.0:
                     return which, 0.0
-            root = _root(p, which, start, right)
+            root = _root(p, which, start, below)
             if root < first:
-                found = which
+                event = which
                 first = root
-        if found != NO_EVENT:
-            if found != HEIGHT:
-                r.lowest = min(r.lowest, _depth(p, found, first))
-            return found, first
+        if event != NO_EVENT:
+            if event != HEIGHT:
+                r.lowest = min(r.lowest, _depth(p, event, first))
+            return event, first
     return NO_EVENT, 1.0

@@ -19,11 +19,11 @@ def lowest(begin: float, slope: float, end: float, rise: float) -> tuple[float, 
     if not under > 0.0:
         return -1.0, end
     root = math.sqrt(under)
-    place = -1.0
+    p = -1.0
     if c > 0.0:
-        place = -slope / (c + root)
+        p = -slope / (c + root)
     elif a != 0.0:
-        place = (root - c) / (3.0 * a)
-    if not 0.0 < place < 1.0:
+        p = (root - c) / (3.0 * a)
+    if not 0.0 < p < 1.0:
         return -1.0, end
-    return place, begin + place * (slope + place * (c + place * a))
+    return p, begin + p * (slope + p * (c + p * a))

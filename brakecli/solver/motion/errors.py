@@ -24,15 +24,7 @@ _RULES = [np.polynomial.legendre.leggauss(points) for points in (5, 3, 12)]
 POINTS = np.array([len(places) for places, _ in _RULES])
 """Places in a step of DOP853, of DOPRI5, whose continuous solutions are of order seven and four, and in a step in
 which patches come or go."""
-PLACES, SHARES = (np.array([np.resize(0.5 * each[i] + 0.5 * (1 - i), 12) for each in _RULES]) for i in (0, 1))
-_TERMS = 4
-"""Terms of the series over up to 0.22 of a step, in which the fastest motion turns by less than half a radian."""
-_AT = STAGES - 1
-_FIRST = 16
-_ROUNDING = 1e-12
-"""Part of a run in which no error is too large, and what of the largest place is rounding."""
-_MUCH = 0.3
-"""Part of the pad that comes or goes in a step, from which on more places are looked at."""
+PLACES, SHARES = (np.array([np.resize(0.5 * rule[i] + 0.5 * (1 - i), 12) for rule in _RULES]) for i in (0, 1))
 
 
 @kernel(inline=False)
@@ -41,8 +33,8 @@ def _ahead(p: Plant, tau: float) -> None:
     c = p.c
     m = p.block
     grip = -side_of(m.phase) * c.phi
-    stiffness = p.runge.touch[_AT, 1]
-    tangential = p.runge.touch[_AT, 2]
+    stiffness = p.runge.touch[STAGES - 1, 1]
+    tangential = p.runge.touch[STAGES - 1, 2]
     free = 0.0 if m.phase == STICK else 1.0 / c.m
     whole = 1.0 / c.m
     x_x = free * (grip * tangential - c.c_xx)
@@ -63,14 +55,14 @@ def _ahead(p: Plant, tau: float) -> None:
         d_y = y
         d_u = u
         d_w = w
-        for n in range(1, _TERMS + 1):
-            part = tau / n
+        for n in range(1, 5):  # the span is up to 0.22 of a step, which turns by less than half a radian
+            factor = tau / n
             a_x = x_x * d_x + x_y * d_y + x_u * d_u + x_w * d_w
             a_y = y_x * d_x + y_y * d_y + y_u * d_u + y_w * d_w
-            d_x = part * d_u
-            d_y = part * d_w
-            d_u = part * a_x
-            d_w = part * a_y
+            d_x = factor * d_u
+            d_y = factor * d_w
+            d_u = factor * a_x
+            d_w = factor * a_y
             x = x + d_x
             y = y + d_y
             u = u + d_u
@@ -89,17 +81,17 @@ def _size(error: float) -> float:
 
 @kernel(inline=False)
 def _beyond(p: Plant) -> int:
-    """1 where the error is more than the most; at first, when the motion is small, it says nothing."""
+    """1 where the error is more than the most; in the first 16th of a run, when the motion is small, 0."""
     m = p.block
     t = p.tangent
     if t.knows == 0:
         return 0
-    rounding = _ROUNDING * max(m.largest[X], m.largest[Y])
+    rounding = 1e-12 * max(m.largest[X], m.largest[Y])
     for i in range(4):
         size = max(m.largest[i], abs(p.runge.end[i]))
         error = abs(m.columns[BY_STEPS, i])
         if size > rounding * (t.rate if i >= V_X else 1.0) and not error <= t.most * size:
-            return 1 if p.runge.level > p.grid.samples // _FIRST else 0
+            return 1 if p.runge.level > p.grid.samples // 16 else 0
     return 0
 
 
@@ -111,7 +103,8 @@ def _rule(p: Plant) -> int:
     pad = p.layer.pad
     changes = abs(r.touch[0, 1] - r.touch[END_STAGE, 1])
     opens = m.phase != OPEN and r.begin[Y] + reach(r, Y) > pad.full_up_to
-    if changes > _MUCH * 2.0 * pad.half_length * pad.k or (r.pair == 0 and opens):
+    # where much of the pad comes or goes in the step, more are
+    if changes > 0.3 * 2.0 * pad.half_length * pad.k or (r.pair == 0 and opens):
         return 2
     return 0 if changes > 0.0 else r.pair
 
@@ -135,28 +128,28 @@ def grow(p: Plant, tables: Floats, scratch: Floats, h: float) -> None:
     begin = 0.0
     t.moved = 0.0
     worst = t.worst[min(r.level * SPANS // p.grid.samples, SPANS - 1)]
-    for place in range(POINTS[rule]):
+    for node in range(POINTS[rule]):
         if stopped(p.layer.pad.signals):  # an evaluation may take as long as a step
             break
-        theta = PLACES[rule, place]
-        part = step * SHARES[rule, place]
+        theta = PLACES[rule, node]
+        span = step * SHARES[rule, node]
         before = theta - begin
-        begin += SHARES[rule, place]
+        begin += SHARES[rule, node]
         for i in range(4):
             r.w[i], r.rates[i] = interpolated_both(r, i, theta)
-        act(p, tables, scratch, _AT, theta * step, r.w)
+        act(p, tables, scratch, STAGES - 1, theta * step, r.w)
         missing = left_out(r.w[Y], p.layer, scratch) / c.m if p.layer.contact.kind == CELLS else 0.0
         _ahead(p, before * step)
         for i in range(4):
             if m.phase != STICK or i in (Y, V_Y):
-                e[i] += part * (r.rates[i] / step - r.slopes[_AT, i])
-        n[V_X] += part * side_of(m.phase) * c.phi * missing
-        n[V_Y] -= part * missing
+                e[i] += span * (r.rates[i] / step - r.slopes[STAGES - 1, i])
+        n[V_X] += span * side_of(m.phase) * c.phi * missing
+        n[V_Y] -= span * missing
         moved = abs(e[V_X] + n[V_X])
         if m.phase == STICK:
             moved = cone(p, theta * step, r.w)[1]
         t.moved = max(t.moved, moved)
-        _ahead(p, part - before * step)
+        _ahead(p, span - before * step)
         for i in range(4):
             worst[0, i] = max(worst[0, i], _size(e[i]))
             worst[1, i] = max(worst[1, i], _size(n[i]))

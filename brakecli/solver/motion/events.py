@@ -1,7 +1,6 @@
 """What happens between two phases, whoever carries the motion: a phase is entered, an event or a knot passed."""
 
 import math
-from typing import Any
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.block import (
@@ -14,6 +13,7 @@ from brakecli.solver.block import (
     SIZE,
     V_X,
     V_Y,
+    Block,
     X,
     Y,
 )
@@ -29,8 +29,8 @@ from brakecli.solver.phases import (
     anchored,
     counted,
     following,
-    held,
     stalled,
+    stick_or_slip,
 )
 from brakecli.solver.plant import Plant
 from brakecli.solver.schedules import KNOT, TIME, integral_at, segment, slope_at, value_at
@@ -53,7 +53,7 @@ def enter_phase(p: Plant, phase: int) -> None:
         m.z[V_X] = m.z[BELT]
         pull, its_rounding = exact.hold(p.exact, PULL, m.z, p.c.m, m.h)
         push, rounding = exact.hold(p.exact, PUSH, m.z, p.c.m, m.h)
-        phase = held(pull, push, its_rounding, rounding)
+        phase = stick_or_slip(pull, push, its_rounding, rounding)
     m.phase = phase
     exact.make(p.c, p.exact, phase, m.h)
 
@@ -80,7 +80,7 @@ def look(p: Plant) -> None:
 
 
 @kernel
-def see(m: Any) -> None:
+def see(m: Block) -> None:
     """See whether U and Q change."""
     m.steady = 1 if m.z[BELT_SLOPE] == 0.0 and m.z[LOAD_SLOPE] == 0.0 else 0
     for i in range(SIZE):

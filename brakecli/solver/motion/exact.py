@@ -5,7 +5,6 @@ z, and powers are quadratic in z.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
@@ -22,6 +21,8 @@ from brakecli.solver.block import (
     TERMS,
     V_X,
     V_Y,
+    Block,
+    Exact,
     X,
     Y,
 )
@@ -30,6 +31,7 @@ from brakecli.solver.double_double import EPSILON
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of
+from brakecli.solver.records import Works
 
 _NODES = 0.5 + 0.5 * np.polynomial.legendre.leggauss(NODES)[0]
 _SHARES = 0.5 * np.polynomial.legendre.leggauss(NODES)[1]
@@ -38,17 +40,13 @@ _POWERS = np.vander(np.append(_NODES, 1.0), TERMS, increasing=True)
 """Powers of the places of the nodes, and of the end of the step."""
 ROUNDING = 8.0 * EPSILON
 """Rounding of a margin over the sum of its terms."""
-_REACH = 4.0 / 27.0
-"""Largest p (1 - p)²: a cubic is below the lower one of its ends by no more than this times its slopes there, the
-negative one at the begin and the positive one at the end."""
 _OFF = 0.01
 """What a margin may differ by from the cubic, over its slopes at both ends: one that swings does by 1e-3 of its
 amplitude, (0.8 rad)⁴/384."""
-_FLAT = 1e-6  # part of a step up to which a margin that begins at zero dips by rounding alone
 
 
 @kernel
-def acceleration(e: Any, phase: int, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
+def acceleration(e: Exact, phase: int, x: float, y: float, v_x: float, v_y: float) -> tuple[float, float]:
     """A (x, y, v_x, v_y) along x and y in a phase: what links, dashpots and contact make of (6)-(7)."""
     a = e.generator
     return (
@@ -58,17 +56,17 @@ def acceleration(e: Any, phase: int, x: float, y: float, v_x: float, v_y: float)
 
 
 @kernel
-def rate(e: Any, phase: int, z: Floats, found: Floats) -> None:
+def rate(e: Exact, phase: int, z: Floats, into: Floats) -> None:
     """The derivative of x, y, v_x and v_y by time at a motion in a phase: A z."""
     for i in range(4):
         total = 0.0
         for k in range(SIZE):
             total += e.generator[phase, i, k] * z[k]
-        found[i] = total
+        into[i] = total
 
 
 @kernel(inline=False)
-def expand(e: Any, begin: Floats, phase: int, span: float) -> None:
+def expand(e: Exact, begin: Floats, phase: int, span: float) -> None:
     """The series of the motion from its begin over a span (s): (A span)^k z / k!."""
     a = e.generator
     z = e.series
@@ -82,14 +80,14 @@ def expand(e: Any, begin: Floats, phase: int, span: float) -> None:
     belt_slope = z[0, BELT_SLOPE]
     z[1, BELT], z[1, LOAD] = span * z[0, BELT_SLOPE], span * z[0, LOAD_SLOPE]  # further terms are 0
     for k in range(1, TERMS):
-        part = span / k
+        factor = span / k
         a_x, a_y = acceleration(e, phase, x, y, v_x, v_y)
         a_x += a[phase, V_X, LOAD] * load + a[phase, V_X, BELT_SLOPE] * belt_slope
         a_y += a[phase, V_Y, LOAD] * load
-        x = part * v_x
-        y = part * v_y
-        v_x = part * a_x
-        v_y = part * a_y
+        x = factor * v_x
+        y = factor * v_y
+        v_x = factor * a_x
+        v_y = factor * a_y
         load = z[1, LOAD] if k == 1 else 0.0
         belt_slope = 0.0
         z[k, X] = x
@@ -99,7 +97,7 @@ def expand(e: Any, begin: Floats, phase: int, span: float) -> None:
 
 
 @kernel
-def reach(e: Any, theta: float) -> None:
+def reach(e: Exact, theta: float) -> None:
     """Put the motion at a part of the span of the series, Σ z_k θ^k, into `at`."""
     z = e.series
     q = theta * theta
@@ -111,7 +109,7 @@ def reach(e: Any, theta: float) -> None:
 
 
 @kernel(inline=False)
-def _describe(c: Coefficients, e: Any, phase: int) -> None:
+def _describe(c: Coefficients, e: Exact, phase: int) -> None:
     """The generator of a phase, its friction force and margins."""
     a = e.generator[phase]
     force = e.friction[phase]
@@ -156,7 +154,7 @@ def _describe(c: Coefficients, e: Any, phase: int) -> None:
 
 
 @kernel(inline=False)
-def _unroll(e: Any, phase: int, h: float) -> None:
+def _unroll(e: Exact, phase: int, h: float) -> None:
     """The series of exp(A h): the rows for x, y, v_x and v_y of (A h)^k / k!."""
     f = e.flow
     for i in range(4):
@@ -164,13 +162,13 @@ def _unroll(e: Any, phase: int, h: float) -> None:
             f[0, i, j] = 1.0 if i == j else 0.0
             f[1, i, j] = h * e.generator[phase, i, j]
     for k in range(2, TERMS):
-        part = h / k
+        factor = h / k
         for j in range(SIZE):
             a_x, a_y = acceleration(e, phase, f[k - 1, X, j], f[k - 1, Y, j], f[k - 1, V_X, j], f[k - 1, V_Y, j])
-            f[k, X, j] = part * f[k - 1, V_X, j]
-            f[k, Y, j] = part * f[k - 1, V_Y, j]
-            f[k, V_X, j] = part * a_x
-            f[k, V_Y, j] = part * a_y
+            f[k, X, j] = factor * f[k - 1, V_X, j]
+            f[k, Y, j] = factor * f[k - 1, V_Y, j]
+            f[k, V_X, j] = factor * a_x
+            f[k, V_Y, j] = factor * a_y
     for k in range(1, TERMS):  # a slope of Q is followed as Q is, and added up over time
         for i in range(4):
             f[k, i, LOAD_SLOPE] = h / k * f[k - 1, i, LOAD]
@@ -183,7 +181,7 @@ def _rates(c: Coefficients, v_x: float, v_y: float) -> tuple[float, float, float
 
 
 @kernel
-def _sum_up(e: Any, node: int) -> None:
+def _sum_up(e: Exact, node: int) -> None:
     """The rows of exp(A t) = Σ (t/h)^k (A h)^k/k! at a node of Gauss' rule or the end: the small terms first."""
     for i in range(4):
         for j in range(SIZE):
@@ -200,7 +198,7 @@ def _driven(row: Floats, j: int, time: float) -> float:
 
 
 @kernel(inline=False)
-def make(c: Coefficients, e: Any, phase: int, h: float) -> None:
+def make(c: Coefficients, e: Exact, phase: int, h: float) -> None:
     """The matrices of a phase for steps h: its margins M, their slopes h A' M, and exp(A h)' times all.
 
     They are made once: the step, the shoe and the stiffness of the contact stay what they are.
@@ -231,7 +229,7 @@ def make(c: Coefficients, e: Any, phase: int, h: float) -> None:
 
 
 @kernel(inline=False)
-def _make_works(c: Coefficients, e: Any, phase: int, h: float) -> None:
+def _make_works(c: Coefficients, e: Exact, phase: int, h: float) -> None:
     """The works of a step of a phase as forms in its first motion, z' W z, by Gauss' rule.
 
     They are the integrals of F_x U, F_x (U - ẋ), ẋ b_xx ẋ + 2 ẋ b_xy ẏ + ẏ b_yy ẏ, and Q_x ẋ + Q_y ẏ.
@@ -263,9 +261,9 @@ def _make_works(c: Coefficients, e: Any, phase: int, h: float) -> None:
             for k in range(2):
                 u = max(j, BELT + k)
                 q = max(j, LOAD + k)
-                part = time if k == 1 else 1.0
-                w[0, u, j + BELT + k - u] += part * pull[n, j]
-                w[3, q, j + LOAD + k - q] += part * share * rates[2]
+                factor = time if k == 1 else 1.0
+                w[0, u, j + BELT + k - u] += factor * pull[n, j]
+                w[3, q, j + LOAD + k - q] += factor * share * rates[2]
     for i in range(SIZE):
         for j in range(i + 1):
             drag = damp = 0.0
@@ -277,12 +275,12 @@ def _make_works(c: Coefficients, e: Any, phase: int, h: float) -> None:
 
 
 @kernel(inline=False)
-def part_works(c: Coefficients, e: Any, m: Any, work: Any) -> None:
+def part_works(c: Coefficients, e: Exact, m: Block, work: Works) -> None:
     """Add the works on the part of the series that has been taken, as `_make_works` has them."""
     z = e.at
-    span = m.part * m.span
+    span = m.taken * m.span
     for node in range(NODES):
-        reach(e, m.part * _NODES[node])
+        reach(e, m.taken * _NODES[node])
         share = span * _SHARES[node]
         force = 0.0
         rates = _rates(c, z[V_X], z[V_Y])
@@ -295,7 +293,7 @@ def part_works(c: Coefficients, e: Any, m: Any, work: Any) -> None:
 
 
 @kernel
-def add_products(e: Any, m: Any) -> None:
+def add_products(e: Exact, m: Block) -> None:
     """Let the works of the last step, a whole one, wait: its products z_i z_j, or z_i alone while U and Q last."""
     m.waiting += 1
     if m.steady == 0:
@@ -309,7 +307,7 @@ def add_products(e: Any, m: Any) -> None:
 
 
 @kernel(inline=False)
-def add_works(c: Coefficients, e: Any, m: Any, work: Any) -> None:
+def add_works(c: Coefficients, e: Exact, m: Block, work: Works) -> None:
     """Add up the works Σ W_ij Σ z_i z_j of the whole steps that wait for it, all of the present phase."""
     if m.waiting == 0:
         return
@@ -340,27 +338,27 @@ def add_works(c: Coefficients, e: Any, m: Any, work: Any) -> None:
 
 
 @kernel(inline=False)
-def look(e: Any, phase: int, z: Floats) -> None:
+def look(e: Exact, phase: int, z: Floats) -> None:
     """The matrix of the phase, the margins of the motion reached, and their slopes."""
     for k in range(AHEAD):
         e.before[k] = 0.0
     for i in range(SIZE):
-        part = z[i]
+        component = z[i]
         for k in range(AHEAD):
-            e.before[k] += e.margins[phase, i, k] * part
+            e.before[k] += e.margins[phase, i, k] * component
             e.now[i, k] = e.step[phase, i, k]
     _drive(e, z)
 
 
 @kernel(inline=False)
-def _drive(e: Any, z: Floats) -> None:
+def _drive(e: Exact, z: Floats) -> None:
     """What U, Q and their slopes add to a step."""
     for k in range(AHEAD):
         e.drive[k] = 0.0
     for i in range(BELT, SIZE):
-        part = z[i]
+        component = z[i]
         for k in range(AHEAD):
-            e.drive[k] += e.now[i, k] * part
+            e.drive[k] += e.now[i, k] * component
     for k in range(4):
         e.noise[k] = abs(e.now[BELT, k] * z[BELT]) + abs(e.now[LOAD, k] * z[LOAD])
 
@@ -368,12 +366,13 @@ def _drive(e: Any, z: Floats) -> None:
 @kernel(inline=False)
 def _may_dip(begin: float, slope: float, end: float, rise: float) -> bool:
     """Whether a margin may be negative inside a step, by its cubic."""
-    place, value = lowest(begin, slope, end, rise)
-    return place > _FLAT and value < _OFF * (abs(rise) + abs(slope))
+    p, value = lowest(begin, slope, end, rise)
+    # up to 1e-6 of a step a margin that begins at zero dips by rounding alone
+    return p > 1e-6 and value < _OFF * (abs(rise) + abs(slope))
 
 
 @kernel
-def try_whole_step(e: Any, m: Any) -> bool:
+def try_whole_step(e: Exact, m: Block) -> bool:
     """Take a whole step, Σ now_ik z_i, and return True.
 
     Where a margin runs out in it, or may do so, the motion stays as it is, and the answer is False.
@@ -395,7 +394,8 @@ def try_whole_step(e: Any, m: Any) -> bool:
         rise = e.after[MARGINS + k]
         if end < 0.0:
             return False
-        if min(begin, end) < (_REACH + _OFF) * (abs(rise) + abs(slope)) and _may_dip(begin, slope, end, rise):
+        # largest p (1 - p)²: the cubic is below the lower end by no more than this times its slopes at both ends
+        if min(begin, end) < (4.0 / 27.0 + _OFF) * (abs(rise) + abs(slope)) and _may_dip(begin, slope, end, rise):
             return False
     for i in range(4):
         z[i] = e.after[i]
@@ -408,7 +408,7 @@ def try_whole_step(e: Any, m: Any) -> bool:
 
 
 @kernel(inline=False)
-def falls(e: Any, m: Any) -> float:
+def falls(e: Exact, m: Block) -> float:
     """The rate of the margin that has run out, its gradient in `normal`, and the rates before and behind."""
     rate(e, m.old, m.z, m.arrives)
     rate(e, m.phase, m.z, m.leaves)
@@ -431,21 +431,21 @@ def unseen(mass: float, belt: float, slope: float) -> float:
 
 
 @kernel
-def hold(e: Any, which: int, z: Floats, mass: float, h: float) -> tuple[float, float]:
+def hold(e: Exact, which: int, z: Floats, mass: float, h: float) -> tuple[float, float]:
     """A margin of stick (N), and by how much it may miss zero: by rounding, or as nobody sees what follows."""
     total = 0.0
     terms = 0.0
     slope = 0.0
     for i in range(SIZE):
-        part = e.margins[STICK, i, 4 + which] * z[i]
-        total = total + part
-        terms = terms + abs(part)
+        term = e.margins[STICK, i, 4 + which] * z[i]
+        total = total + term
+        terms = terms + abs(term)
         slope += e.margins[STICK, i, 4 + MARGINS + which] * z[i]
     return total, max(0.5 * ROUNDING * terms, unseen(mass, z[BELT], slope / h))
 
 
 @kernel(inline=False)
-def rises(c: Coefficients, e: Any, z: Floats, h: float) -> bool:
+def rises(c: Coefficients, e: Exact, z: Floats, h: float) -> bool:
     """Whether a shoe that rests on the wheel without pressing it leaves: its first derivative that is not zero."""
     make(c, e, OPEN, h)  # nothing presses, so that all phases begin alike
     expand(e, z, OPEN, h)
@@ -453,9 +453,9 @@ def rises(c: Coefficients, e: Any, z: Floats, h: float) -> bool:
         total = 0.0
         terms = 0.0
         for i in range(SIZE):
-            part = e.generator[OPEN, V_Y, i] * e.series[k, i] if i < BELT or k < 2 else 0.0
-            total = total + part
-            terms = terms + abs(part)
+            term = e.generator[OPEN, V_Y, i] * e.series[k, i] if i < BELT or k < 2 else 0.0
+            total = total + term
+            terms = terms + abs(term)
         if abs(total) > ROUNDING * terms:
             return total > 0.0
     return False

@@ -1,15 +1,15 @@
 """How far a motion reaches: extremes of its state and of its margins, the time in each phase, and its turns."""
 
 import math
-from typing import Any
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.block import BANDS, MARGINS, PHASES, TERMS, V_X, X
+from brakecli.solver.block import BANDS, MARGINS, PHASES, TERMS, V_X, Block, Exact, X
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact
 from brakecli.solver.motion.cubic import lowest
 from brakecli.solver.motion.locate import NO_EVENT, root
 from brakecli.solver.phases import STICK
+from brakecli.solver.records import Notes
 from brakecli.solver.track import put, turned
 
 _BANDS: tuple[float, ...] = 0.25, 0.35
@@ -17,7 +17,7 @@ _BANDS: tuple[float, ...] = 0.25, 0.35
 
 
 @kernel(inline=False)
-def begin(m: Any) -> None:
+def begin(m: Block) -> None:
     """Begin to note, from the motion reached on."""
     m.square = 0.0
     for phase in range(PHASES):
@@ -32,29 +32,29 @@ def begin(m: Any) -> None:
 
 
 @kernel(inline=False)
-def zero_of_velocity(e: Any, m: Any) -> float:
+def zero_of_velocity(e: Exact, m: Block) -> float:
     """The part of the last step's span at which v_x passes through zero; puts the motion there in `at`."""
     sign = 1.0 if m.begin[V_X] > 0.0 else -1.0
     exact.expand(e, m.begin, m.old, m.span)
     for k in range(TERMS):
         e.polynomial[0, k] = sign * e.series[k, V_X]
-    part = root(e, 0, 0.0, m.part)
-    exact.reach(e, part)
-    return part
+    theta = root(e, 0, 0.0, m.taken)
+    exact.reach(e, theta)
+    return theta
 
 
 @kernel(inline=False)
-def note_turn(e: Any, m: Any, track: Any, scratch: Floats) -> None:
+def note_turn(e: Exact, m: Block, track: Notes, scratch: Floats) -> None:
     """Note a turning point in the last step."""
     kind = turned(track, m.z[V_X])
     if kind < 0:
         return
-    part = 0.0  # at the event behind which the step began, where v_x was that of a wheel at rest
-    place = m.begin[X]
+    theta = 0.0  # at the event behind which the step began, where v_x was that of a wheel at rest
+    x = m.begin[X]
     if m.begin[V_X] * m.z[V_X] < 0.0:
-        part = zero_of_velocity(e, m)
-        place = e.at[X]
-    put(track, scratch, kind, m.base + m.time + (part - m.part) * m.span, place)
+        theta = zero_of_velocity(e, m)
+        x = e.at[X]
+    put(track, scratch, kind, m.base + m.time + (theta - m.taken) * m.span, x)
 
 
 @kernel
@@ -70,9 +70,9 @@ def _square(first: float, last: float, way: float, seconds: float) -> float:
 
 
 @kernel(inline=False)
-def note(e: Any, m: Any) -> None:
+def note(e: Exact, m: Block) -> None:
     """Note what is least and largest in the last step, and how long it took."""
-    seconds = m.part * m.span
+    seconds = m.taken * m.span
     m.spent[m.old] += seconds
     for i in range(4):
         m.low[i] = min(m.low[i], m.z[i])

@@ -1,26 +1,24 @@
 """A motion on smooth pads as Python sees it: carried over a span, or followed to what becomes of it."""
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.block import BELT, LOAD, MATRICES, MOST_TURNS, V_X
+from brakecli.solver.block import BELT, LOAD, MATRICES, MOST_TURNS, V_X, Block, Way
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.motion.orbit import CLOSED
 from brakecli.solver.motion.tasks import FLY, SEEK, SWING, advance
 from brakecli.solver.phases import BACKWARD, FORWARD, OPEN, STICK
-from brakecli.solver.plant import PLANT
-from brakecli.solver.records import COEFFICIENTS, filled, one
+from brakecli.solver.plant import Plant
+from brakecli.solver.records import one
 from brakecli.solver.system import System, longest_step
 
 FOREVER = 1e300
 """A time (s) that no motion reaches: finite, as a mode that decays does not grow in it at all."""
-
-SAME = 1e-7
-"""Part of a period by which times in it may differ from one round of an orbit to the next."""
 
 Modes = tuple[NDArray[np.complex128], NDArray[np.complex128]]
 """Eigenvalues of steady sliding (1/s), and the vectors of position and velocity in columns."""
@@ -46,22 +44,19 @@ class Orbit(NamedTuple):
         return 1.0 / self.period
 
 
-_NO_SCRATCH = np.zeros(1)
-_NO_ROWS = np.zeros((1, 1))
-
-
-def _done(plants: Any, block: Any, task: int, seconds: float = 0.0) -> int:
+def _done(plants: Sequence[Plant], block: Block, task: int, seconds: float = 0.0) -> int:
     """Have the motion of a block do a task; how that ends."""
     block.task = task
     block.seconds = seconds
-    return int(advance(plants, _NO_SCRATCH, _NO_SCRATCH, _NO_ROWS, _NO_ROWS, 0))
+    rows = np.zeros((1, 1))  # a flow fills none, and has no tables
+    return int(advance(plants, rows[0], rows[0], rows, rows, 0))
 
 
-def _plants(c: Coefficients, stiffness: float, belt: float, load: float) -> Any:
+def _plants(c: Coefficients, stiffness: float, belt: float, load: float) -> Sequence[Plant]:
     """An array of the record of a shoe on smooth pads, at constant speed and load."""
-    plants = one(PLANT)
-    plant = plants[0]
-    plant.c = filled(COEFFICIENTS, c._asdict())
+    plants = one(Plant)
+    plant: Plant = plants[0]
+    plant.c = c
     plant.exact.stiffness = stiffness
     plant.block.propagator = MATRICES
     plant.block.z[BELT] = belt
@@ -80,7 +75,7 @@ class SmoothFlow:
     def __init__(self, c: Coefficients, stiffness: float, belt: float, load: float) -> None:
         """From the contact's stiffness (N/m), U (m/s) and Q (N)."""
         self._plants = _plants(c, stiffness, belt, load)
-        self.path = self._plants[0].block
+        self.path: Block = self._plants[0].block
 
     @classmethod
     def of(cls, system: System) -> "SmoothFlow":
@@ -119,10 +114,10 @@ class SmoothFlow:
 def _rounds(word: list[int], times: list[float], period: float) -> int:
     """How often a motion has gone round its orbit in a time (s): phases, and when they change, repeat as often."""
     for rounds in range(MOST_TURNS, 1, -1):
-        events, rest = divmod(len(times), rounds)
-        if rest == 0 and events > 0 and word[events:] == word[: len(word) - events]:
+        events, remainder = divmod(len(times), rounds)
+        if remainder == 0 and events > 0 and word[events:] == word[: len(word) - events]:
             away = np.subtract(times[events:], times[:-events]) - period / rounds
-            if np.abs(away).max() <= SAME * period:
+            if np.abs(away).max() <= 1e-7 * period:  # times differ by that from round to round
                 return rounds
     return 1
 
@@ -138,18 +133,18 @@ class Pursuit:
         c: Coefficients,
         acting: tuple[float, float, float],
         state: Floats,
-        rest: Floats,
+        equilibrium: Floats,
         modes: Modes,
         duration: float = FOREVER,
     ) -> None:
         """Begin from a state (x, y, v_x, v_y), with what acts: the contact's stiffness (N/m), U (m/s), Q (N).
 
-        `rest`: x and y of steady sliding. `modes`: its eigenvalues, and the vectors of position and velocity in
-        columns. Raises LinAlgError where two of them are alike.
+        `equilibrium`: x and y of steady sliding. `modes`: its eigenvalues, and the vectors of position and
+        velocity in columns. Raises LinAlgError where two of them are alike.
         """
         self._plants = _plants(c, *acting)
-        self.path = self._plants[0].block
-        self.way = self._plants[0].way
+        self.path: Block = self._plants[0].block
+        self.way: Way = self._plants[0].way
         o = self.way
         values, vectors = modes
         inverse = np.linalg.inv(modes[1])
@@ -157,8 +152,8 @@ class Pursuit:
         belt = acting[1]
         o.duration = duration
         o.sliding = BACKWARD if belt > 0.0 else FORWARD
-        o.rest[:2] = rest
-        o.room[:] = (-rest[1], abs(belt))
+        o.equilibrium[:2] = equilibrium
+        o.room[:] = (-equilibrium[1], abs(belt))
         o.into[0] = inverse.real
         o.into[1] = inverse.imag
         o.growth[:] = values.real

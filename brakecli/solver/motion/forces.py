@@ -14,7 +14,7 @@ from brakecli.solver.contact.closed_form import CLEAR, FULL, clear, coverage, fu
 from brakecli.solver.contact.force import evaluate
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
-from brakecli.solver.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, held, side_of
+from brakecli.solver.phases import HEIGHT, OPEN, PULL, PUSH, SLIDING, STICK, side_of, stick_or_slip
 from brakecli.solver.plant import Plant
 
 NEAR = 3.0
@@ -53,7 +53,7 @@ def rounding(p: Plant) -> tuple[float, float]:
 
 
 @kernel(inline=False)
-def touch(p: Plant, tables: Floats, scratch: Floats, place: float, y: float) -> None:
+def touch(p: Plant, tables: Floats, scratch: Floats, at_x: float, y: float) -> None:
     """Fill `contact` for the phase; the closed form while a bound proves full contact.
 
     The place is x (m) less what the wheel has travelled since the time that the angles of its waves belong to.
@@ -78,28 +78,28 @@ def touch(p: Plant, tables: Floats, scratch: Floats, place: float, y: float) -> 
         contact.store = 0.5 * contact.stiffness * y * y
     elif covered != FULL or p.layer.window.rows > 0:
         if light and p.layer.evaluator == _CELLS:
-            press(place, y, p.layer, tables, scratch, p.runge.steeply == 1)
+            press(at_x, y, p.layer, tables, scratch, p.runge.steeply == 1)
         else:
-            evaluate(place, y, p.layer, tables, scratch)
+            evaluate(at_x, y, p.layer, tables, scratch)
         if covered == FULL:  # the sum over cells is the closed form
             contact.kind = CLOSED_FORM
     elif light:
-        full_press(place, y, p.layer, tables, scratch)
+        full_press(at_x, y, p.layer, tables, scratch)
     else:
-        full_contact(place, y, p.layer, tables, scratch)
+        full_contact(at_x, y, p.layer, tables, scratch)
 
 
 @kernel(inline=False)
-def rate(p: Plant, phase: int, w: Floats, since: float, found: Floats) -> None:
+def rate(p: Plant, phase: int, w: Floats, since: float, into: Floats) -> None:
     """The derivative of x, y, v_x and v_y by time, (6)-(7), with the contact found last."""
     c = p.c
     z = p.block.z
     force = p.layer.contact.normal_force
     along, across = resistance(c, z[LOAD] + z[LOAD_SLOPE] * since, w[X], w[Y], w[V_X], w[V_Y])
-    found[X] = w[V_X]
-    found[Y] = w[V_Y]
-    found[V_X] = z[BELT_SLOPE] if phase == STICK else (-side_of(phase) * c.phi * force - along) / c.m  # Eq. (6)
-    found[V_Y] = (force - across) / c.m  # Eq. (7)
+    into[X] = w[V_X]
+    into[Y] = w[V_Y]
+    into[V_X] = z[BELT_SLOPE] if phase == STICK else (-side_of(phase) * c.phi * force - along) / c.m  # Eq. (6)
+    into[V_Y] = (force - across) / c.m  # Eq. (7)
 
 
 @kernel(inline=False)
@@ -155,10 +155,10 @@ def act(p: Plant, tables: Floats, scratch: Floats, stage: int, since: float, w: 
     if stuck:
         w[X] = z[X] + passed
         w[V_X] = z[BELT] + z[BELT_SLOPE] * since
-    place = z[X] if stuck else w[X] - passed
+    at_x = z[X] if stuck else w[X] - passed
     if p.runge.on_grid == 1:  # its angles are those of the begin of the span
-        place = m.anchor if stuck else w[X] - z[BELT] * (m.time + since)
-    touch(p, tables, scratch, place, w[Y])
+        at_x = m.anchor if stuck else w[X] - z[BELT] * (m.time + since)
+    touch(p, tables, scratch, at_x, w[Y])
     settle(p, stage, w, since)
 
 
@@ -287,7 +287,7 @@ def held_phase(p: Plant) -> int:
     bound = c.phi * p.layer.contact.normal_force
     needed = c.m * z[BELT_SLOPE] + resistance(c, z[LOAD], z[X], z[Y], z[BELT], z[V_Y])[0]
     along, _ = rounding(p)
-    phase = held(bound - needed, bound + needed, along, along)
+    phase = stick_or_slip(bound - needed, bound + needed, along, along)
     if phase == STICK:
         z[V_X] = z[BELT]
         r.least_hold = min(r.least_hold, max(bound - abs(needed), 0.0))

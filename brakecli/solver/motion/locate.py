@@ -1,21 +1,16 @@
 """The first event in a step: which margin of the phase runs out, and where, on the series of the motion."""
 
-from typing import Any
-
-from brakecli.solver.block import BELT, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, X, Y
+from brakecli.solver.block import BELT, LOAD, MARGINS, SIZE, TERMS, V_X, V_Y, Exact, X, Y
 from brakecli.solver.double_double import EPSILON
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion.exact import ROUNDING, unseen
 from brakecli.solver.phases import SOONER, STICK
 
 NO_EVENT = -1
-_SMALLEST = 2.0**-12  # part of a span that is looked at for a dip
-_LOOKS = 12  # how often a margin that begins at zero is sought above it
-_MOST_STEPS = 200  # of a search for a root; halving alone takes 53 from a bracket that does not begin at 0
 
 
 @kernel
-def _value(e: Any, row: int, theta: float) -> tuple[float, float]:
+def _value(e: Exact, row: int, theta: float) -> tuple[float, float]:
     """A polynomial Σ p_k θ^k and its slope at a part θ of the span."""
     of = e.polynomial
     q = theta * theta
@@ -32,30 +27,30 @@ def _value(e: Any, row: int, theta: float) -> tuple[float, float]:
 
 
 @kernel(inline=False)
-def root(e: Any, row: int, left: float, right: float) -> float:
+def root(e: Exact, row: int, low: float, high: float) -> float:
     """Where a polynomial falls through zero between left and right: Newton's iteration, kept in the bracket."""
-    first = e.polynomial[row, 0] if left == 0.0 else _value(e, row, left)[0]
-    last = _value(e, row, right)[0]
-    place = left + (right - left) * first / (first - last) if first > 0.0 > last else right
-    for _ in range(_MOST_STEPS):
-        value, slope = _value(e, row, place)
+    first = e.polynomial[row, 0] if low == 0.0 else _value(e, row, low)[0]
+    last = _value(e, row, high)[0]
+    theta = low + (high - low) * first / (first - last) if first > 0.0 > last else high
+    for _ in range(200):  # halving alone takes 53 from a bracket that does not begin at 0
+        value, slope = _value(e, row, theta)
         if value > 0.0:
-            left = place
+            low = theta
         else:
-            right = place
-        if slope < 0.0 and abs(value) <= -EPSILON * place * slope:
+            high = theta
+        if slope < 0.0 and abs(value) <= -EPSILON * theta * slope:
             break
-        new = place - value / slope if slope < 0.0 else left
-        if not left < new < right:
-            new = 0.5 * (left + right)
-        if not left < new < right:
+        new = theta - value / slope if slope < 0.0 else low
+        if not low < new < high:
+            new = 0.5 * (low + high)
+        if not low < new < high:
             break
-        place = new
-    return place
+        theta = new
+    return theta
 
 
 @kernel(inline=False)
-def _follow(e: Any, phase: int, which: int) -> float:
+def _follow(e: Exact, phase: int, which: int) -> float:
     """A margin on the series as a polynomial Σ (m z_k) θ^k, and minus its slope as another; its rounding."""
     row = e.margins[phase, :, 4 + which]
     z = e.series
@@ -81,7 +76,7 @@ def _follow(e: Any, phase: int, which: int) -> float:
 
 
 @kernel(inline=False)
-def _below(e: Any, allowed: float) -> float:
+def _below(e: Exact, allowed: float) -> float:
     """The first place found at which a margin is negative beyond its rounding; 0 where it surely is nowhere so.
 
     A piece of the span is passed where a bound proves it, or where the polynomial bends one way all over it, so
@@ -95,37 +90,37 @@ def _below(e: Any, allowed: float) -> float:
         bound += k * (k - 1) * (k - 2) * abs(of[0, k])
     if far < of[0, 0]:
         return 0.0
-    left = 0.0
+    begin = 0.0
     width = 1.0
-    while left < 1.0:
+    while begin < 1.0:
         half = 0.5 * width
-        right = min(left + width, 1.0)
-        value, slope = _value(e, 0, left + half)
-        bend = -_value(e, 1, left + half)[1]
+        end = min(begin + width, 1.0)
+        value, slope = _value(e, 0, begin + half)
+        bend = -_value(e, 1, begin + half)[1]
         change = bound * half  # of the bend, up to an end
         clear = value - (abs(slope) + 0.5 * (abs(bend) + change) * half) * half > 0.0
-        if not clear and -change < bend < change and half > _SMALLEST:
+        if not clear and -change < bend < change and half > 2.0**-12:  # of the span
             width = half
             continue
         if not clear:
-            if bend > 0.0 and _value(e, 1, left)[0] > 0.0 > _value(e, 1, right)[0]:
-                place = root(e, 1, left, right)
-                if _value(e, 0, place)[0] < -allowed:
-                    return place
-            if _value(e, 0, right)[0] < -allowed:
-                return right
-        left = right
-        width = min(2.0 * width, 1.0 - left)
+            if bend > 0.0 and _value(e, 1, begin)[0] > 0.0 > _value(e, 1, end)[0]:
+                dip = root(e, 1, begin, end)
+                if _value(e, 0, dip)[0] < -allowed:
+                    return dip
+            if _value(e, 0, end)[0] < -allowed:
+                return end
+        begin = end
+        width = min(2.0 * width, 1.0 - begin)
     return 0.0
 
 
 @kernel(inline=False)
-def first_event(e: Any, phase: int, mass: float, span: float) -> tuple[int, float]:
+def first_event(e: Exact, phase: int, mass: float, span: float) -> tuple[int, float]:
     """The margin that runs out first on the series, and at which part of the span; 0 if it never was positive.
 
     A shoe of this mass (kg) sticks although it lacks a little, see `exact.unseen`; the span is in s.
     """
-    found = NO_EVENT
+    event = NO_EVENT
     first = 1.0
     for which in range(MARGINS if phase == STICK else MARGINS - 1):
         allowed = _follow(e, phase, which)
@@ -134,20 +129,20 @@ def first_event(e: Any, phase: int, mass: float, span: float) -> tuple[int, floa
             if phase != STICK or start < -unseen(mass, e.series[0, BELT], e.polynomial[0, 1] / span):
                 return which, 0.0
             allowed = -start
-        right = _below(e, allowed)
-        if right == 0.0:
+        high = _below(e, allowed)
+        if high == 0.0:
             continue
-        left = 0.0
+        low = 0.0
         if start <= allowed:  # it begins at zero: where is it positive?
-            left = right
-            for _ in range(_LOOKS):
-                left *= SOONER
-                if _value(e, 0, left)[0] > allowed:
+            low = high
+            for _ in range(12):
+                low *= SOONER
+                if _value(e, 0, low)[0] > allowed:
                     break
             else:
                 return which, 0.0
-        place = root(e, 0, left, right)
-        if place < first:
-            found = which
-            first = place
-    return found, first
+        theta = root(e, 0, low, high)
+        if theta < first:
+            event = which
+            first = theta
+    return event, first

@@ -15,10 +15,9 @@ multipliers. If all lie within the unit circle, the orbit attracts its neighbour
 """
 
 import math
-from typing import Any
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.block import BELT, MOST_SMOOTH_EVENTS, MOST_TURNS, V_X, V_Y, X, Y
+from brakecli.solver.block import BELT, MOST_SMOOTH_EVENTS, MOST_TURNS, V_X, V_Y, Block, Way, X, Y
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, extent
 from brakecli.solver.motion.advance import advance, begin, fly
@@ -32,23 +31,17 @@ GOING_ON, LINEAR, FOUND, ENDED = range(4)
 CLOSED = 1e-11
 """Part of the size of a cycle by which an orbit may fail to close."""
 _FIRST = 3  # falls before an orbit is sought, and between two tries, which grow further apart
-_NEAR = 0.02  # of the size of a cycle: distance of two returns at which an orbit is sought
-_REACH = 0.1  # of the size of a cycle: step of Newton's iteration beyond which it may lead elsewhere
-_ROUNDS = 6
-_FOLLOWS = 0.25  # part by which a return to the orbit may differ from what the multipliers say
-_UNSURE = 100.0  # times `CLOSED`, by which returns may differ in any case
 _MANY = 1000  # more often no phase is entered in a cycle
-_CALLS = 2000  # turning points of a call: Python hears signals in between
 
 
 @kernel
-def _sizes(o: Any, x: float, y: float, v_y: float) -> float:
+def _sizes(o: Way, x: float, y: float, v_y: float) -> float:
     """A distance on the section over the amplitude of the cycle: the largest of |x|, |y| and |v_y| T/2π."""
-    return max(abs(x), abs(y), abs(v_y) * o.period / TWO_PI) / o.amplitude  # type: ignore[no-any-return]
+    return max(abs(x), abs(y), abs(v_y) * o.period / TWO_PI) / o.amplitude
 
 
 @kernel
-def _put_on_section(m: Any, point: Floats) -> None:
+def _put_on_section(m: Block, point: Floats) -> None:
     m.z[X] = point[0]
     m.z[Y] = point[1]
     m.z[V_X] = 0.0
@@ -56,8 +49,8 @@ def _put_on_section(m: Any, point: Floats) -> None:
 
 
 @kernel(inline=False)
-def _once_around(p: Plant, scratch: Floats, o: Any) -> bool:
-    """From `point` over a period, and on to the section: the return in `kept`, and M; False where there is none.
+def _once_around(p: Plant, scratch: Floats, o: Way) -> bool:
+    """From `point` over a period, and on to the section: the return in `image`, and M; False where there is none.
 
     The rest of the way to the section, -ẋ/ẍ, is followed along the velocity. It vanishes as Newton's iteration
     closes the orbit, which is closed only when it has: M is that of the time flown.
@@ -66,14 +59,14 @@ def _once_around(p: Plant, scratch: Floats, o: Any) -> bool:
     _put_on_section(m, o.point)
     if fly(p, scratch, o.period, 4) != DONE or m.velocity[V_X] >= 0.0:
         return False
-    rest = -m.z[V_X] / m.velocity[V_X]
-    o.period += rest
-    o.late = rest
+    remaining = -m.z[V_X] / m.velocity[V_X]
+    o.period += remaining
+    o.late = remaining
     for column in range(3):
         o.by_point[column] = -m.columns[column if column < 2 else V_Y, V_X] / m.velocity[V_X]
     for row in range(3):
         i = row if row < 2 else V_Y
-        o.kept[row] = m.z[i] + rest * m.velocity[i]
+        o.image[row] = m.z[i] + remaining * m.velocity[i]
         for column in range(3):
             moved = m.columns[column if column < 2 else V_Y, i]
             o.map[row, column] = moved + m.velocity[i] * o.by_point[column]
@@ -81,7 +74,7 @@ def _once_around(p: Plant, scratch: Floats, o: Any) -> bool:
 
 
 @kernel(inline=False)
-def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
+def _solved(o: Way, x: float, y: float, z: float) -> tuple[float, float, float]:
     """(I - M)⁻¹ of a vector, by Cramer's rule; far away where there is none."""
     a = 1.0 - o.map[0, 0]
     b = -o.map[0, 1]
@@ -102,7 +95,7 @@ def _solved(o: Any, x: float, y: float, z: float) -> tuple[float, float, float]:
 
 
 @kernel(inline=False)
-def _measured(p: Plant, scratch: Floats, o: Any) -> bool:
+def _measured(p: Plant, scratch: Floats, o: Way) -> bool:
     """Go round the orbit for its numbers; False where it takes another way than the motion did.
 
     Its falls are not counted: of a short rise and fall of ẋ within a step the motion may have seen nothing.
@@ -128,7 +121,7 @@ def _measured(p: Plant, scratch: Floats, o: Any) -> bool:
 
 
 @kernel(inline=False)
-def _closed(p: Plant, scratch: Floats, o: Any) -> bool:
+def _closed(p: Plant, scratch: Floats, o: Way) -> bool:
     """Find the orbit of `turns` falls near the last return; False where none is found that the motion comes to.
 
     By Newton's method: the point moves by (I - M)⁻¹ (return - point).
@@ -136,14 +129,15 @@ def _closed(p: Plant, scratch: Floats, o: Any) -> bool:
     s = o.returns
     at = o.point
     k = o.turns
+    near = 0.1  # of the size of a cycle: what is farther off may lead elsewhere
     for i in range(3):
         at[i] = s[0, i]
-    for _ in range(_ROUNDS):
+    for _ in range(6):
         if not _once_around(p, scratch, o):
             return False
-        x, y, v_y = _solved(o, o.kept[0] - at[0], o.kept[1] - at[1], o.kept[2] - at[2])
+        x, y, v_y = _solved(o, o.image[0] - at[0], o.image[1] - at[1], o.image[2] - at[2])
         o.error = max(_sizes(o, x, y, v_y), TWO_PI * abs(o.late) / o.period)
-        if not o.error < _REACH:
+        if not o.error < near:
             return False
         if o.error < CLOSED:
             break
@@ -154,18 +148,19 @@ def _closed(p: Plant, scratch: Floats, o: Any) -> bool:
     if o.error >= CLOSED:
         return False
     for i in range(3):  # does the last return follow from the one before it as M says?
-        o.kept[i] = s[0, i] - at[i]
+        o.image[i] = s[0, i] - at[i]
         for j in range(3):
-            o.kept[i] -= o.map[i, j] * (s[k, j] - at[j])
+            o.image[i] -= o.map[i, j] * (s[k, j] - at[j])
     was = _sizes(o, s[k, 0] - at[0], s[k, 1] - at[1], s[k, 2] - at[2])
     o.away = _sizes(o, s[0, 0] - at[0], s[0, 1] - at[1], s[0, 2] - at[2])
-    if not (_sizes(o, o.kept[0], o.kept[1], o.kept[2]) <= _FOLLOWS * was + _UNSURE * CLOSED and was < _REACH):
+    # the return may differ from what the multipliers say, by a fourth and by what an orbit fails to close
+    if not (_sizes(o, o.image[0], o.image[1], o.image[2]) <= 0.25 * was + 100.0 * CLOSED and was < near):
         return False
     return _measured(p, scratch, o)
 
 
 @kernel(inline=False)
-def _bound(m: Any, o: Any, seconds: float) -> None:
+def _bound(m: Block, o: Way, seconds: float) -> None:
     """How far from steady sliding a linear motion can come in a time t: Σ |a| exp(max(σ, 0) t) of its modes."""
     for k in range(3):
         o.bound[k] = 0.0
@@ -173,8 +168,8 @@ def _bound(m: Any, o: Any, seconds: float) -> None:
         real = 0.0
         imaginary = 0.0
         for i in range(4):
-            real += o.into[0, q, i] * (m.z[i] - o.rest[i])
-            imaginary += o.into[1, q, i] * (m.z[i] - o.rest[i])
+            real += o.into[0, q, i] * (m.z[i] - o.equilibrium[i])
+            imaginary += o.into[1, q, i] * (m.z[i] - o.equilibrium[i])
         powers = max(o.growth[q], 0.0) * seconds
         size = math.hypot(real, imaginary) * (math.exp(powers) if powers < MOST_POWERS else math.inf)
         for k in range(3):
@@ -182,7 +177,7 @@ def _bound(m: Any, o: Any, seconds: float) -> None:
 
 
 @kernel(inline=False)
-def _stays_linear(m: Any, o: Any) -> bool:
+def _stays_linear(m: Block, o: Way) -> bool:
     """Whether the motion slides steadily, or beside that, and no event can come before the end."""
     if m.phase != o.sliding:
         return False
@@ -191,7 +186,7 @@ def _stays_linear(m: Any, o: Any) -> bool:
 
 
 @kernel(inline=False)
-def _note_return(at: Floats, o: Any, fall: float) -> bool:
+def _note_return(at: Floats, o: Way, fall: float) -> bool:
     """Note a return to the section, `at`; whether it lies close to the one `turns` before."""
     s = o.returns
     for k in range(MOST_TURNS, 0, -1):
@@ -221,13 +216,13 @@ def _note_return(at: Floats, o: Any, fall: float) -> bool:
         o.period = fall - o.fell[k]
         o.amplitude = 0.5 * (high - low)
         o.turns = k
-        if _sizes(o, s[0, 0] - s[k, 0], s[0, 1] - s[k, 1], s[0, 2] - s[k, 2]) < _NEAR:
+        if _sizes(o, s[0, 0] - s[k, 0], s[0, 1] - s[k, 1], s[0, 2] - s[k, 2]) < 0.02:  # near enough for Newton
             return True
     return False
 
 
 @kernel(inline=False)
-def _tried(p: Plant, scratch: Floats, o: Any) -> bool:
+def _tried(p: Plant, scratch: Floats, o: Way) -> bool:
     """Seek an orbit near the last return. Where there is none the motion goes on as if nothing had been sought."""
     m = p.block
     o.phase = m.phase
@@ -243,7 +238,7 @@ def _tried(p: Plant, scratch: Floats, o: Any) -> bool:
 
 
 @kernel(inline=False)
-def _go_on(p: Plant, o: Any) -> None:
+def _go_on(p: Plant, o: Way) -> None:
     """Go on with the motion that was left for an orbit."""
     m = p.block
     for i in range(4):
@@ -256,7 +251,7 @@ def _go_on(p: Plant, o: Any) -> None:
 
 
 @kernel
-def _follow(m: Any) -> None:
+def _follow(m: Block) -> None:
     """Carry the motion alone, and note its phases."""
     m.count = 0
     m.measures = 0
@@ -265,7 +260,7 @@ def _follow(m: Any) -> None:
 
 
 @kernel(inline=False)
-def seek(p: Plant, scratch: Floats, o: Any) -> int:
+def seek(p: Plant, scratch: Floats, o: Way) -> int:
     """Follow the motion until something is known of all that is to come; what that is, or `GOING_ON`."""
     m = p.block
     if o.started == 0:
@@ -282,7 +277,7 @@ def seek(p: Plant, scratch: Floats, o: Any) -> int:
             return LINEAR
     if o.on_orbit == 1:
         _go_on(p, o)
-    for _ in range(_CALLS):
+    for _ in range(2000):  # turning points: Python hears signals in between
         if m.time >= o.duration or o.events > MOST_SMOOTH_EVENTS:
             return ENDED
         ends = advance(p, scratch, o.duration, True)
@@ -299,8 +294,8 @@ def seek(p: Plant, scratch: Floats, o: Any) -> int:
         if m.begin[V_X] < 0.0:
             o.low = min(o.low, min(m.begin[X], m.z[X]))
             continue
-        part = extent.zero_of_velocity(p.exact, m)
-        if _note_return(p.exact.at, o, m.time + (part - m.part) * m.span) and _tried(p, scratch, o):
+        theta = extent.zero_of_velocity(p.exact, m)
+        if _note_return(p.exact.at, o, m.time + (theta - m.taken) * m.span) and _tried(p, scratch, o):
             return FOUND
         if _stays_linear(m, o):
             return LINEAR
@@ -308,7 +303,7 @@ def seek(p: Plant, scratch: Floats, o: Any) -> int:
 
 
 @kernel(inline=False)
-def swing(p: Plant, scratch: Floats, o: Any, seconds: float) -> None:
+def swing(p: Plant, scratch: Floats, o: Way, seconds: float) -> None:
     """Widen `low` and `high` to the least and largest x of a linear motion from `m.z` on, for some time.
 
     It ends early where the modes that are left can reach no further.
@@ -327,5 +322,5 @@ def swing(p: Plant, scratch: Floats, o: Any, seconds: float) -> None:
         o.low = min(o.low, m.low[X])
         o.high = max(o.high, m.high[X])
         _bound(m, o, seconds)
-        if o.rest[X] + o.bound[0] <= o.high and o.rest[X] - o.bound[0] >= o.low:
+        if o.equilibrium[X] + o.bound[0] <= o.high and o.equilibrium[X] - o.bound[0] >= o.low:
             return

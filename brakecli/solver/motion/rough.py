@@ -22,19 +22,12 @@ from brakecli.solver.double_double import two_product
 from brakecli.solver.motion import events as ends
 from brakecli.solver.motion.tasks import FLY, step
 from brakecli.solver.phases import STICK
-from brakecli.solver.plant import PLANT
-from brakecli.solver.records import COEFFICIENTS, filled, one
+from brakecli.solver.plant import Plant
+from brakecli.solver.records import one
 from brakecli.solver.roughness import wheel_angles
 from brakecli.solver.system import System
 
-CELLS_PER_WAVE = 24
-LEAST_CELLS = 96
 STEPS_PER_PERIOD = 20  # of the fastest mode, or of the shortest wave that passes
-
-STABLE = 2.5
-"""Largest decay in a step, in powers of e: beyond 3.3 DOPRI5 multiplies what decays."""
-
-_NO_ROWS = np.zeros((1, 1))
 
 
 class Status(IntEnum):
@@ -91,7 +84,7 @@ class Flown:
 
 def default_cells(system: System) -> int:
     """Cells of the pad for the shortest wave of both surfaces."""
-    return max(LEAST_CELLS, math.ceil(CELLS_PER_WAVE * 2.0 * system.half_length * system.most_turns))
+    return max(96, math.ceil(24 * 2.0 * system.half_length * system.most_turns))
 
 
 def default_steps(system: System, span: float, per_period: float = STEPS_PER_PERIOD) -> int:
@@ -100,7 +93,7 @@ def default_steps(system: System, span: float, per_period: float = STEPS_PER_PER
     There are more where dashpots ask for them: a step must not be long beside the fastest decay.
     """
     fastest = max(system.natural_frequencies[1], system.passing_frequency)
-    decays = fastest_decay(system.coefficients) / STABLE
+    decays = fastest_decay(system.coefficients) / 2.5  # beyond 3.3 DOPRI5 multiplies what decays
     return max(1, math.ceil(max(per_period * fastest, decays) * span))
 
 
@@ -119,13 +112,14 @@ class RoughFlow:
             raise ValueError(f"{cells} cells are too few: {on_cells.nodes} are needed")
         self.system = system
         self.cells = on_cells.nodes
-        self._plants = one(PLANT)
+        self._plants = one(Plant)
         self._layer = build_layer("cells", on_cells.pad)
         self._belt = system.belt_speed
         self._waves = system.wheel.waves
         self._angles = self._layer.angles
-        plant = self._plant = self._plants[0]
-        plant.c = filled(COEFFICIENTS, system.coefficients._asdict())
+        self._plant: Plant = self._plants[0]
+        plant = self._plant
+        plant.c = system.coefficients
         plant.layer = self._layer.layer
         plant.runge.on_grid = 1
         plant.runge.pair = 1
@@ -144,7 +138,8 @@ class RoughFlow:
         m.count = 4 if tangents else 0
         m.seconds = span
         r.steps = steps
-        status = Status(step(self._plants, self._layer.tables, self._layer.scratch, _NO_ROWS, _NO_ROWS, 0))
+        rows = np.zeros((1, 1))  # a flow fills none
+        status = Status(step(self._plants, self._layer.tables, self._layer.scratch, rows, rows, 0))
         events = int(m.events)
         return Flown(
             status,

@@ -13,16 +13,6 @@ from brakecli.solver.motion.tableaus import END_STAGE, NODES, USED
 from brakecli.solver.phases import STICK
 from brakecli.solver.plant import Plant
 
-_DEFECT = 20.0
-_EARLY = 0.47
-_LATE = 0.93
-"""Allowed defect of a step over its allowed error, and the parts of the step where it is taken, between stages."""
-_DENSE_ROUNDING = 63.0
-"""The continuous solution's slope there is rounded so many times more than the slopes of the stages."""
-_NEAR = 1e-6
-"""The last change of the end of a step by Newton's iteration, over the step: what is left is about its square."""
-_AGAIN = 8
-"""Steps that are made to where an event is, at most."""
 _TINY = 1e-300  # no division by zero where nothing moves
 
 
@@ -65,7 +55,7 @@ def _error(p: Plant, h: float) -> float:
 
 @kernel(inline=False)
 def _defect(p: Plant, h: float, theta: float) -> float:
-    """By how much the continuous solution misses (6)-(7) at a part of a step h, over what the tolerance leaves it.
+    """By how much the continuous solution misses (6)-(7) at a part of a step h, over 20 times its allowed error.
 
     It is |du/dθ - h f(u)|. The error estimate is a linear functional of the slopes, which vanishes for a kink at
     certain places of a step.
@@ -76,9 +66,9 @@ def _defect(p: Plant, h: float, theta: float) -> float:
     along, across = rounding(p)
     for i in range(V_Y if m.phase == STICK else V_X, 4):
         defect = abs(tableaus.interpolated_both(r, i, theta)[1] - h * r.slopes[STAGES - 1, i])
-        noise = _DENSE_ROUNDING * h * (along if i == V_X else across) / p.c.m
+        noise = 63.0 * h * (along if i == V_X else across) / p.c.m  # 63 times that of stages
         largest = max(m.largest[i], abs(r.end[i]))
-        worst = max(worst, defect / (_DEFECT * r.tolerance * largest + noise + _TINY))
+        worst = max(worst, defect / (20.0 * r.tolerance * largest + noise + _TINY))
     return worst
 
 
@@ -98,7 +88,7 @@ def attempt(p: Plant, tables: Floats, scratch: Floats, h: float, allowed: float)
     tableaus.make_continuous(r, p.block.z, h)
     if p.layer.contact.kind == CLOSED_FORM:
         return worst
-    for theta in (_EARLY, _LATE):
+    for theta in (0.47, 0.93):  # between stages
         for i in range(4):
             r.w[i] = tableaus.interpolated(r, i, theta)
         act(p, tables, scratch, STAGES - 1, theta * h, r.w)
@@ -115,22 +105,22 @@ def to_event(p: Plant, tables: Floats, scratch: Floats, which: int, h: float) ->
     """
     r = p.runge
     longest = r.length
-    for _ in range(_AGAIN):
+    for _ in range(8):
         if attempt(p, tables, scratch, h, math.inf) == math.inf:
             return 0.0
         rates = r.slopes[END_STAGE]
         find_margins(p, r.end, rates[V_Y], h)
         find_margin_rates(p, rates, r.touch[END_STAGE, 1])
         slope = r.margin_rate[which]
-        rest = -r.margin[which] / slope if slope != 0.0 else 0.0
-        if abs(rest) <= _NEAR * h:
+        correction = -r.margin[which] / slope if slope != 0.0 else 0.0
+        if abs(correction) <= 1e-6 * h:  # what is missed then is about its square
             for i in range(4):
-                r.end[i] += rest * rates[i]
-            h += rest
+                r.end[i] += correction * rates[i]
+            h += correction
             break
-        if not 0.0 < h + rest <= longest:
+        if not 0.0 < h + correction <= longest:
             break
-        h += rest
+        h += correction
     else:
         h = r.length
     return h

@@ -7,14 +7,14 @@ from brakecli.solver.kernels import kernel, stopped
 from brakecli.solver.motion import columns, exact
 from brakecli.solver.motion.advance import advance, begin
 from brakecli.solver.motion.events import DONE, LONG, STALLED, pass_knot
-from brakecli.solver.phases import CONE, OPEN, STICK, carried, side_of
+from brakecli.solver.phases import OPEN, STICK, carried, side_of
 from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.schedules import integral_at, value_at
 from brakecli.solver.tangent import renew
 from brakecli.solver.track import mark
 
-_NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
+_NONE, _DIVERGED, _STALLED = (int(failure) for failure in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
 
 
 @kernel(inline=False)
@@ -79,7 +79,7 @@ def put_sample(p: Plant, w: Floats, phase: int, normal: float, fraction: float, 
     """Put a sample into the state: the motion w with its forces (N); `needed` is what it takes to stick."""
     m = p.block
     bound = p.c.phi * normal
-    holds = phase == STICK and abs(needed) <= bound * CONE
+    holds = phase == STICK and abs(needed) <= bound * (1.0 + 1e-12)  # but for rounding
     state, friction = observed(side_of(phase), holds, needed, normal, bound)
     for i in range(4):
         m.row[i] = w[i]

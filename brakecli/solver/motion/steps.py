@@ -36,32 +36,7 @@ from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at
 from brakecli.solver.track import enter, put, turned
 
-_LOCAL = 0.05
-"""Error of a step over the tolerance of the histories, to which the errors of all steps add up."""
-_SAFETY = 0.9
-_LEAST = 0.2
-_MOST = 6.0
-"""The part that is taken of the step that the error asks for, and the bounds of a step's change."""
-_RADIANS = 2.0
-"""Largest angle that the fastest motion turns by in a step, so that the looks at the margins follow it."""
-_DECAY = 4.0
-"""Largest step times decay rate: steps are stable up to 6, but inaccurate beyond 4."""
-_FIRST = 0.05
-_FIRST_ON_NODES = 0.25
-"""The first step over the longest."""
-_MANY_SWITCHES = 2
-_CLOSER = 0.1
-"""Phases that end at once, after which the next step is shorter: closer by, one of them does not end."""
-_MOST_SWITCHES = 60
-"""A run ends after so many phases that end at once."""
-_LOOSE = 2e-5
-"""Tolerance from which on steps of order five are cheaper, where the contact is that of nodes."""
-_NEAR = 1e-3
-"""The last change of a place in a step by Newton's iteration, over the step: what is left is about its square."""
-_CORRECTED = 6
-"""Steps of that iteration, at most."""
-
-_NONE, _DIVERGED, _STALLED = (int(each) for each in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
+_NONE, _DIVERGED, _STALLED = (int(failure) for failure in (Failure.NONE, Failure.DIVERGED, Failure.STALLED))
 _NOT_CLOSED = int(Failure.NOT_CLOSED)
 
 
@@ -76,21 +51,23 @@ def _longest(p: Plant) -> float:
     m = p.block
     r = p.runge
     pad = p.layer.pad
+    angle = 2.0  # that the fastest motion may turn by, rad, so that the looks at the margins follow it
+    decay = 4.0  # of the step times its rate: steps are stable up to 6, but inaccurate beyond 4
     stiffness = (1.0 + c.phi) * (2.0 * pad.half_length * pad.k) if m.phase != OPEN else 0.0
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + stiffness  # of the largest eigenvalue of the stiffness
     longest = p.grid.samples * p.grid.interval
-    if bound * longest * longest > _RADIANS * _RADIANS * c.m:
-        longest = _RADIANS / math.sqrt(bound / c.m)
+    if bound * longest * longest > angle * angle * c.m:
+        longest = angle / math.sqrt(bound / c.m)
     rate = (c.b_xx + c.b_yy) / c.m  # at least that of the fastest decay
-    if rate * longest > _DECAY:
-        longest = _DECAY / rate
+    if rate * longest > decay:
+        longest = decay / rate
     if pad.wheel_terms > 0 and m.phase != OPEN and m.phase != STICK:
         # A fourth of the shortest wave, so that no patch comes and goes unseen; on nodes half of it.
         slide = abs(m.z[V_X] - m.z[BELT]) + abs(r.slopes[0, V_X] - m.z[BELT_SLOPE]) * r.step
         wave = pad.cell if r.light == 0 else 2.0 * pad.cell
         if slide * longest > wave:
             longest = wave / slide
-    return longest  # type: ignore[no-any-return]
+    return longest
 
 
 @kernel(inline=False)
@@ -123,9 +100,9 @@ def put_at_start(p: Plant, tables: Floats, scratch: Floats) -> None:
         m.largest[i] = abs(m.z[i])
     if p.tangent.on == 1 or p.tangent.knows == 1:
         m.count = KNOWN + p.tangent.on
-    r.tolerance = _LOCAL * p.grid.tolerance
+    r.tolerance = 0.05 * p.grid.tolerance  # of a step: in the histories the errors of all steps add up
     r.light = 1 if p.layer.pad.nodes > 0 else 0
-    r.pair = 1 if r.light == 1 and p.grid.tolerance >= _LOOSE else 0
+    r.pair = 1 if r.light == 1 and p.grid.tolerance >= 2e-5 else 0  # from there on order five is cheaper on nodes
     m.phase = OPEN
     _arrive(p, tables, scratch)
     height = m.z[Y] - p.layer.pad.clear_from
@@ -140,7 +117,7 @@ def begin(p: Plant, scratch: Floats) -> None:
     enter_phase(p, p.block.phase)
     anchor(p, scratch)
     renew(p)
-    r.step = (_FIRST if r.light == 0 else _FIRST_ON_NODES) * _longest(p)
+    r.step = (0.05 if r.light == 0 else 0.25) * _longest(p)
 
 
 @kernel
@@ -168,8 +145,8 @@ def _meet(p: Plant, scratch: Floats) -> None:
     slides = rates[X] - m.z[BELT] - m.z[BELT_SLOPE] * since
     rate = abs(r.touch[stage, 2] * slides - r.touch[stage, 1] * rates[Y])
     age = 1.5 * r.touch[stage, 0]
-    part = max(age / rate / r.length, 0.0) if age < rate * r.length else 1.0
-    theta = 1.0 - part if meets else part
+    share = max(age / rate / r.length, 0.0) if age < rate * r.length else 1.0
+    theta = 1.0 - share if meets else share
     enter(
         p.track,
         scratch,
@@ -193,11 +170,11 @@ def _follow(p: Plant, scratch: Floats) -> None:
         first = r.begin[V_X]
         last = r.end[V_X]
         theta = first / (first - last) if first * last < 0.0 else 0.0
-        for _ in range(_CORRECTED):
+        for _ in range(6):
             velocity, slope = interpolated_both(r, V_X, theta)
             before = theta
             theta = min(max(theta - velocity / slope, 0.0), 1.0) if slope != 0.0 else theta
-            if abs(theta - before) < _NEAR:
+            if abs(theta - before) < 1e-3:  # what is missed then is about its square
                 break
         put(track, scratch, kind, m.base + m.time + theta * r.length, interpolated(r, X, theta))
     if (r.touch[END_STAGE, 1] > 0.0) == (track.phase == OPEN):
@@ -248,9 +225,7 @@ def _at_knot(p: Plant) -> bool:
     """Whether the slope of speed or load has changed with the last step."""
     z = p.block.z
     before = p.runge.outside
-    return (  # type: ignore[no-any-return]
-        z[BELT_SLOPE] != before[BELT_SLOPE - BELT] or z[LOAD_SLOPE] != before[LOAD_SLOPE - BELT]
-    )
+    return z[BELT_SLOPE] != before[BELT_SLOPE - BELT] or z[LOAD_SLOPE] != before[LOAD_SLOPE - BELT]  # type: ignore[no-any-return]
 
 
 @kernel(inline=False)
@@ -265,14 +240,15 @@ def step(p: Plant, tables: Floats, scratch: Floats) -> int:
     last = to_end <= limit
     limit = min(limit, to_end)
     h = min(r.step, limit)
-    growth = _MOST
+    growth = 6.0  # of a step over the one before, at most
     while True:
         if stopped(p.layer.pad.signals):  # stages are empty then, and no step keeps the tolerance
             return _STALLED
         if h < limit:
             last = False
         error = attempt(p, tables, scratch, h, 1.0)
-        factor = max(_LEAST, min(growth, _SAFETY * error ** (-1.0 / ORDER[r.pair]))) if error > 0.0 else growth
+        # a part of the step that the error asks for
+        factor = max(0.2, min(growth, 0.9 * error ** (-1.0 / ORDER[r.pair]))) if error > 0.0 else growth
         if error <= 1.0:
             break
         h = h * factor
@@ -284,9 +260,9 @@ def step(p: Plant, tables: Floats, scratch: Floats) -> int:
     m.old = m.phase
     if m.which != NO_EVENT and theta == 0.0:
         r.switches += 1
-        if r.switches > _MANY_SWITCHES:
-            r.step = _CLOSER * h
-        if r.switches > _MOST_SWITCHES:
+        if r.switches > 2:
+            r.step = 0.1 * h  # closer by, one of the phases does not end at once
+        if r.switches > 60:
             return _STALLED
     else:
         if m.which != NO_EVENT:

@@ -7,12 +7,11 @@ of DOP853 alone. DOPRI5 has no stages from 6 to 11.
 """
 
 import math
-from typing import Any
 
 import numpy as np
 
 from brakecli.solver.arrays import Floats
-from brakecli.solver.block import POWERS, STAGES
+from brakecli.solver.block import POWERS, STAGES, Runge
 from brakecli.solver.kernels import kernel
 
 END_STAGE = 12
@@ -52,15 +51,17 @@ A[0][np.tril_indices(STAGES, -1)] = _numbers("""
     -4.697621415361164 7.683421196062599 4.06898981839711 0.3567271874552811 0 0 0 -0.0013990241651590145
     2.9475147891527724 -9.15095847217987
 """)
-A[1, 1, 0] = 1 / 5
-A[1, 2, :2] = 3 / 40, 9 / 40
-A[1, 3, :3] = 44 / 45, -56 / 15, 32 / 9
-A[1, 4, :4] = 19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729
-A[1, 5, :5] = 9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656
+A[1, 1:6, :5] = [
+    [1 / 5, 0, 0, 0, 0],
+    [3 / 40, 9 / 40, 0, 0, 0],
+    [44 / 45, -56 / 15, 32 / 9, 0, 0],
+    [19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729, 0],
+    [9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656],
+]
 A[1, END_STAGE, :6] = 35 / 384, 0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84
 
-THIRD = np.zeros((2, STAGES))
-ERROR_WEIGHTS = np.zeros((2, STAGES))
+THIRD = np.zeros_like(NODES)
+ERROR_WEIGHTS = np.zeros_like(NODES)
 DENSE = np.zeros((2, POWERS - 3, STAGES))
 THIRD[0, : END_STAGE + 1] = _numbers("""
     -0.18980075407240762 0 0 0 0 4.450312892752409 1.8915178993145003 -5.801203960010585 -0.4226823213237919
@@ -70,8 +71,15 @@ ERROR_WEIGHTS[0, : END_STAGE + 1] = _numbers("""
     0.01312004499419488 0 0 0 0 -1.2251564463762044 -0.4957589496572502 1.6643771824549864 -0.35032884874997366
     0.3341791187130175 0.08192320648511571 -0.022355307863886294 0
 """)
-ERROR_WEIGHTS[1, :6] = (71 / 57600, 0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525)
-ERROR_WEIGHTS[1, END_STAGE] = -1 / 40
+ERROR_WEIGHTS[1, [*range(6), END_STAGE]] = (
+    71 / 57600,
+    0,
+    -71 / 16695,
+    71 / 1920,
+    -17253 / 339200,
+    22 / 525,
+    -1 / 40,
+)
 """What the step differs by from formulas of order three and five, of DOPRI5 from one of order four."""
 
 DENSE[0] = _numbers("""
@@ -97,7 +105,7 @@ DENSE[1, 0, [0, 2, 3, 4, 5, END_STAGE]] = (
 
 
 @kernel(inline=False)
-def combine(r: Any, begin: Floats, h: float, stage: int) -> None:
+def combine(r: Runge, begin: Floats, h: float, stage: int) -> None:
     """The state at a stage of a step h: begin + h Σ A[stage, j] k_j."""
     pair = r.pair
     for i in range(4):
@@ -108,7 +116,7 @@ def combine(r: Any, begin: Floats, h: float, stage: int) -> None:
 
 
 @kernel
-def local_error(r: Any, component: int) -> float:
+def local_error(r: Runge, component: int) -> float:
     """The error of one component in a step, over the step: of order seven, from those of order three and five.
 
     e_5²/√(e_5² + e_3²/100), each e a sum of weighted slopes; of DOPRI5 |e| itself.
@@ -126,7 +134,7 @@ def local_error(r: Any, component: int) -> float:
 
 
 @kernel
-def make_continuous(r: Any, begin: Floats, h: float) -> None:
+def make_continuous(r: Runge, begin: Floats, h: float) -> None:
     """Coefficients of the continuous solution, from the slopes and both ends of a step h.
 
     p_0 is the change, p_1 = h k_first - p_0, p_2 = 2 p_0 - h (k_first + k_last), and the others are h Σ D k.
@@ -149,20 +157,20 @@ def make_continuous(r: Any, begin: Floats, h: float) -> None:
 
 
 @kernel
-def interpolated(r: Any, component: int, theta: float) -> float:
+def interpolated(r: Runge, component: int, theta: float) -> float:
     """One component at the part theta of the step that the continuous solution belongs to.
 
     u = u_0 + θ (p_0 + (1 - θ) (p_1 + θ (p_2 + (1 - θ) (p_3 + …)))).
     """
     total = 0.0
-    rest = 1.0 - theta
+    complement = 1.0 - theta
     for p in range(TERMS[r.pair] - 1, -1, -1):
-        total = (total + r.powers[p, component]) * (theta if p % 2 == 0 else rest)
+        total = (total + r.powers[p, component]) * (theta if p % 2 == 0 else complement)
     return r.begin[component] + total  # type: ignore[no-any-return]
 
 
 @kernel
-def reach(r: Any, component: int) -> float:
+def reach(r: Runge, component: int) -> float:
     """A bound of how far one component of the continuous solution gets from the begin of its step.
 
     |p_0| + |p_1|/4 + 4 |p_2|/27 + Σ |p_k|/16: the largest sizes of θ, θ(1 - θ), θ²(1 - θ), and of products of
@@ -176,17 +184,17 @@ def reach(r: Any, component: int) -> float:
 
 
 @kernel
-def interpolated_both(r: Any, component: int, theta: float) -> tuple[float, float]:
+def interpolated_both(r: Runge, component: int, theta: float) -> tuple[float, float]:
     """`interpolated`, and its derivative by theta."""
     total = 0.0
     slope = 0.0
-    rest = 1.0 - theta
+    complement = 1.0 - theta
     for p in range(TERMS[r.pair] - 1, -1, -1):
         total += r.powers[p, component]
         if p % 2 == 0:
             slope = slope * theta + total
             total = total * theta
         else:
-            slope = slope * rest - total
-            total = total * rest
+            slope = slope * complement - total
+            total = total * complement
     return r.begin[component] + total, slope

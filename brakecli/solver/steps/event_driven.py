@@ -5,11 +5,11 @@ slip, lift-off and touch-down end a step: nothing is smoothed, nothing stepped o
 """
 
 from brakecli.solver import own_steps
-from brakecli.solver.block import BLOCK
+from brakecli.solver.block import Block
 from brakecli.solver.motion import tasks
-from brakecli.solver.records import Weights
+from brakecli.solver.records import Record, Weights
 
-STATE = BLOCK
+STATE: type[Record] = Block
 KEPT = "block"
 LAG = own_steps.LAG
 MEMORY = own_steps.MEMORY

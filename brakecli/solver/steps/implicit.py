@@ -6,27 +6,20 @@ the paper's iteration, (13) and (24), which contracts by about gain * 2ak/a22 an
 """
 
 import math
-from typing import Any
 
 from brakecli.solver.arrays import Floats
 from brakecli.solver.contact.force import evaluate
 from brakecli.solver.friction import minimise, slopes
 from brakecli.solver.kernels import kernel
 from brakecli.solver.method import MOST_EVALUATIONS
-from brakecli.solver.records import Layer
+from brakecli.solver.records import Layer, Problem
 
-SOLVED = 0
-UNCONVERGED = 1
+SOLVED, UNCONVERGED = range(2)
 _RELATIVE = 1e-13
 """Relative change of F below which a step is solved: a few hundred roundings, so that both iterations agree to
 rounding; the gap's own rounding, times the contact's stiffness, is added to it."""
 
 _FIXED_POINT = list(MOST_EVALUATIONS).index("fixed-point")
-_ROUNDING = 4e-16  # of a height in the contact: twice that of a sum
-_OPENED = 10.0  # times the force, up to which a bracket without an upper end is opened; a choice
-_RUN_AWAY = 1e200  # N: a force whose square is no number
-_REACH = 2.0
-"""How far the gap may move in the next step, over how far it has moved in the last."""
 
 
 @kernel(inline=False)
@@ -36,7 +29,7 @@ def _touch(x: float, y: float, layer: Layer, tables: Floats, scratch: Floats) ->
 
 
 @kernel
-def _try_force(layer: Layer, tables: Floats, scratch: Floats, problem: Any, f: float) -> tuple[float, float]:
+def _try_force(layer: Layer, tables: Floats, scratch: Floats, problem: Problem, f: float) -> tuple[float, float]:
     """Minimise for the normal force f, evaluate the contact there; the residual and the rounding in it (N).
 
     The residual is r(f) = F_y(x_0 + gain d, y_0 + gain e) - f.
@@ -54,12 +47,14 @@ def _try_force(layer: Layer, tables: Floats, scratch: Floats, problem: Any, f: f
     y = problem.y_0 + problem.gain * e
     _touch(problem.x_0 + problem.gain * d, y, layer, tables, scratch)
     problem.residual = layer.contact.normal_force - f
-    rounding = _ROUNDING * layer.contact.stiffness * (abs(problem.y_0) + abs(problem.gain * e))
+    rounding = (
+        4e-16 * layer.contact.stiffness * (abs(problem.y_0) + abs(problem.gain * e))
+    )  # of a height: twice that of a sum
     return problem.residual, rounding
 
 
 @kernel
-def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> bool:
+def _take_unevaluated(layer: Layer, problem: Problem, f: float, allowed: float) -> bool:
     """Take the force f if the last evaluation proves that its residual is at most `allowed` (N); whether it does.
 
     Up to f the contact is linear, F_y + ∂F_y/∂x Δx + ∂F_y/∂y Δy, but for places that begin or cease to touch, for
@@ -79,7 +74,7 @@ def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> b
     near = contact.near
     reach = contact.reach
     move = abs(y) + pad.steep * along
-    contact.reach = max(_REACH * move, 0.5 * reach)  # of the next evaluation
+    contact.reach = max(2.0 * move, 0.5 * reach)  # of the next evaluation, which may move the gap twice as far
     if side != problem.side or move > reach:
         return False
     normal_force = contact.normal_force + contact.tangential * x - contact.stiffness * y
@@ -96,7 +91,7 @@ def _take_unevaluated(layer: Layer, problem: Any, f: float, allowed: float) -> b
 
 
 @kernel
-def newton(layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: int) -> tuple[int, int, int]:
+def newton(layer: Layer, tables: Floats, scratch: Floats, problem: Problem, most: int) -> tuple[int, int, int]:
     """Bracketed Newton iteration from the guess problem.normal_force >= 0; (outcome, evaluations, rising points).
 
     F becomes F - r/r' with r' = gain (∂F_y/∂x d' + ∂F_y/∂y e') - 1. A rising point is one where the residual does
@@ -140,7 +135,7 @@ def newton(layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: in
         # Outside the bracket, or a step not half of that before the last: halve the bracket, or open it upwards.
         # The bracket's own width says nothing: Newton's iteration may come from one side and leave the other.
         if not (low <= new <= high) or new == math.inf or abs(new - f) > 0.5 * before_last:
-            new = 0.5 * (low + high) if high < math.inf else _OPENED * max(low, contact.normal_force)
+            new = 0.5 * (low + high) if high < math.inf else 10.0 * max(low, contact.normal_force)  # a choice
         allowed = abs(slope) * _RELATIVE * max(new, contact.normal_force) + rounding
         if _take_unevaluated(layer, problem, new, allowed):
             return SOLVED, evaluation, rising
@@ -151,7 +146,9 @@ def newton(layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: in
 
 
 @kernel
-def fixed_point(layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: int) -> tuple[int, int, int]:
+def fixed_point(
+    layer: Layer, tables: Floats, scratch: Floats, problem: Problem, most: int
+) -> tuple[int, int, int]:
     """The paper's iteration, (13) and (24), from d(0) = dⁿ, e(0) = eⁿ; (outcome, evaluations, 0)."""
     contact = layer.contact
     gain = problem.gain
@@ -162,14 +159,14 @@ def fixed_point(layer: Layer, tables: Floats, scratch: Floats, problem: Any, mos
         if abs(r) <= _RELATIVE * max(f, contact.normal_force) + rounding:
             return SOLVED, evaluation, 0
         f = contact.normal_force
-        if not f < _RUN_AWAY:
+        if not f < 1e200:  # its square is no number
             return UNCONVERGED, evaluation, 0
     return UNCONVERGED, most, 0
 
 
 @kernel
 def solve(
-    layer: Layer, tables: Floats, scratch: Floats, problem: Any, most: int, iteration: int
+    layer: Layer, tables: Floats, scratch: Floats, problem: Problem, most: int, iteration: int
 ) -> tuple[int, int, int]:
     """One step by an iteration of `method.MOST_EVALUATIONS`; (outcome, evaluations, rising points)."""
     if iteration == _FIXED_POINT:

@@ -1,7 +1,7 @@
 """The loop of schemes whose steps are of one length: it steps a state, and samples it on a fixed interval."""
 
 import math
-from typing import Any
+from collections.abc import Sequence
 
 from brakecli.solver import kernels
 from brakecli.solver.arrays import ROWS, VECTOR, Floats
@@ -9,7 +9,7 @@ from brakecli.solver.contact.force import evaluate
 from brakecli.solver.friction import observed
 from brakecli.solver.kernels import entry, kernel, stopped
 from brakecli.solver.phases import FORWARD, OPEN, STICK
-from brakecli.solver.plant import PLANT, Plant
+from brakecli.solver.plant import Plant
 from brakecli.solver.quantities import BOUND, Failure
 from brakecli.solver.roughness import turn
 from brakecli.solver.schedules import integral_at, slope_at, value_at
@@ -18,8 +18,10 @@ from brakecli.solver.steps.implicit import SOLVED, solve
 from brakecli.solver.steps.step import finish, prepare
 from brakecli.solver.track import enter, mark, put, turned
 
-_ROUNDING = 1e-15  # of velocities, some units
-_NONE, _UNCONVERGED, _DIVERGED, _NOT_CLOSED = (int(failure) for failure in tuple(Failure)[:4])
+_NONE = int(Failure.NONE)
+_UNCONVERGED = int(Failure.UNCONVERGED)
+_DIVERGED = int(Failure.DIVERGED)
+_NOT_CLOSED = int(Failure.NOT_CLOSED)
 
 
 @kernel(inline=False)
@@ -54,8 +56,8 @@ def _mark(p: Plant, tables: Floats, scratch: Floats, number: int, t: float) -> N
 def _needed(p: Plant, x: float, y: float, belt: float, rate: float, load: float) -> float:
     """The friction force (N) that it takes to stick: m U̇ + b_xx U + b_xy ẏ + c_xx x + c_xy y + Q_x, by (6)."""
     c = p.c
-    held = c.m * rate + c.b_xx * belt + c.b_xy * p.state.v_y + c.c_xx * x + c.c_xy * y
-    return held + load * c.sin_beta  # type: ignore[no-any-return]
+    force = c.m * rate + c.b_xx * belt + c.b_xy * p.state.v_y + c.c_xx * x + c.c_xy * y
+    return force + load * c.sin_beta
 
 
 @kernel
@@ -94,7 +96,7 @@ def sample(p: Plant, tables: Floats, scratch: Floats, row: Floats) -> None:
     belt_slope = slope_at(scratch[p.drive.belt_at : p.drive.belt_end], t)
     load = value_at(scratch[p.drive.load_at : p.drive.load_end], t)
     sliding = v_x - belt
-    if abs(sliding) <= _ROUNDING * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
+    if abs(sliding) <= 1e-15 * (abs(belt) + abs(belt_slope * t)):  # the step took U at its own rounding of t
         sliding = 0.0
     needed = _needed(p, x, y, belt, belt_slope, load)
     holds = _holds(p, sliding, needed, bound)
@@ -144,12 +146,14 @@ def _note(p: Plant, scratch: Floats, phase: int, v_before: float) -> None:
         v_x = problem.belt
     kind = turned(track, v_x)
     if kind >= 0:
-        rest = h * v_x / (v_x - v_before) if v_before * v_x <= 0.0 else 0.0
-        put(track, scratch, kind, time - rest, x - 0.5 * rest * v_x)
+        since = h * v_x / (v_x - v_before) if v_before * v_x <= 0.0 else 0.0
+        put(track, scratch, kind, time - since, x - 0.5 * since * v_x)
 
 
-@entry(int, [PLANT], VECTOR, VECTOR, ROWS, ROWS, int)
-def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int) -> int:
+@entry(int, [Plant], VECTOR, VECTOR, ROWS, ROWS, int)
+def advance(
+    plants: Sequence[Plant], tables: Floats, scratch: Floats, rows: Floats, events: Floats, stop: int
+) -> int:
     """Step from the level reached to `stop`, filling `rows` with the samples before each step; a `Failure`.
 
     A failure leaves the state at the last good level. `events` gets time and residual of unconverged steps.
@@ -167,18 +171,18 @@ def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: 
     row = 0
     due = grid.lag % grid.per_sample
     sampled = counts.level // grid.per_sample
-    part = counts.level % grid.per_sample
+    passed = counts.level % grid.per_sample
     if counts.level == grid.lag:  # later it is that of the step before, to the last bit
-        problem.belt_next = value_at(belt, grid.interval * sampled + part * s.h)
+        problem.belt_next = value_at(belt, grid.interval * sampled + passed * s.h)
     while counts.level < stop:
-        if part == due:
+        if passed == due:
             sample(p, tables, scratch, rows[row])
             row += 1
         # A level's time is that of the sample before it plus whole steps: no rounding piles up.
         t = grid.interval * sampled
-        t_low = (part + grid.weighted) * s.h
+        t_low = (passed + grid.weighted) * s.h
         problem.belt_now = problem.belt_next
-        problem.belt_next = value_at(belt, t + (part + 1) * s.h)
+        problem.belt_next = value_at(belt, t + (passed + 1) * s.h)
         problem.load = value_at(load, t + t_low)
         if layer.pad.wheel_terms > 0:
             travel, travel_low = integral_at(belt, t, t_low)
@@ -211,16 +215,16 @@ def advance(plants: Any, tables: Floats, scratch: Floats, rows: Floats, events: 
             phase = OPEN if not problem.normal_force > 0.0 else STICK if problem.side == 0.0 else FORWARD
             if phase != track.phase or not state.v_x * track.way > 0.0:
                 _note(p, scratch, phase, v_before)
-        part += 1
-        if part == grid.per_sample:
+        passed += 1
+        if passed == grid.per_sample:
             sampled = sampled + 1
-            part = 0
+            passed = 0
         if stopped(layer.pad.signals):
             break
     return _NONE
 
 
-take_sample = entry(None, PLANT, VECTOR, VECTOR, VECTOR)(sample)
+take_sample = entry(None, Plant, VECTOR, VECTOR, VECTOR)(sample)
 """`sample`, for Python."""
 
 

@@ -1,11 +1,11 @@
 """The piecewise-exact scheme, for smooth surfaces: between two events the motion is linear, a step is a matrix."""
 
 from brakecli.solver import own_steps
-from brakecli.solver.block import BLOCK, TERMS
+from brakecli.solver.block import TERMS, Block
 from brakecli.solver.motion.tasks import advance as advance
-from brakecli.solver.records import Weights
+from brakecli.solver.records import Record, Weights
 
-STATE = BLOCK
+STATE: type[Record] = Block
 KEPT = "block"
 LAG = own_steps.LAG
 MEMORY = own_steps.MEMORY

@@ -2,13 +2,12 @@
 
 from typing import Any
 
-from brakecli.solver import records
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.energy import Mechanical, links_energy
 from brakecli.solver.kernels import kernel
-from brakecli.solver.records import Pair, Weights
+from brakecli.solver.records import Contact, Pair, Problem, State, Weights, Works
 
-STATE = records.STATE
+STATE = State
 KEPT = "state"
 LAG = 1
 MEMORY: tuple[str, ...] = ("x", "y", "x_old", "y_old")
@@ -25,7 +24,7 @@ def order(s: Weights, start: str) -> int:
     return 2 if s.theta_1 == s.theta_3 and start == "consistent" else 1
 
 
-def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
+def begin(s: Weights, state: State, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     """Two levels: x¹ = x⁰ + h v⁰ + h² a⁰/2. The paper's start x¹ = x⁰ is v⁰ = a⁰ = 0."""
     h = s.h
     levels = zip(position, velocity, acceleration, strict=True)
@@ -49,7 +48,7 @@ def mechanical_energy(c: Coefficients, s: Weights, state: Any) -> Mechanical:
 
 
 @kernel
-def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
+def prepare(c: Coefficients, s: Weights, state: State, problem: Problem) -> None:
     """(14), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
     h = s.h
     inertia = 2.0 * c.m / s.h
@@ -75,7 +74,7 @@ def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
 
 
 @kernel
-def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
+def finish(c: Coefficients, s: Weights, state: State, problem: Problem, contact: Contact, work: Works) -> None:
     """x at the new level is x two levels back plus 2hd; and the works: the scheme times half that displacement.
 
     For symmetric weights inertia and links then change an energy of the pair of levels, exactly; with

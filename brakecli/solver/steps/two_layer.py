@@ -1,14 +1,11 @@
 """The two-layer scheme with weights, (18)-(25): unknowns p, q, the velocities at the new level."""
 
-from typing import Any
-
-from brakecli.solver import records
 from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.energy import energy_at_level
 from brakecli.solver.kernels import kernel
-from brakecli.solver.records import Pair, Weights
+from brakecli.solver.records import Contact, Pair, Problem, State, Weights, Works
 
-STATE = records.STATE
+STATE = State
 KEPT = "state"
 LAG = 0
 MEMORY: tuple[str, ...] = ("x", "y", "v_x", "v_y")
@@ -26,14 +23,14 @@ def order(s: Weights, start: str) -> int:
     return 2 if s.theta_1 == s.theta_2 == 0.5 else 1
 
 
-def begin(s: Weights, state: Any, position: Pair, velocity: Pair, acceleration: Pair) -> None:
+def begin(s: Weights, state: State, position: Pair, velocity: Pair, acceleration: Pair) -> None:
     """The initial state itself."""
     state.x, state.y = state.x_old, state.y_old = position
     state.v_x, state.v_y = velocity
 
 
 @kernel
-def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
+def prepare(c: Coefficients, s: Weights, state: State, problem: Problem) -> None:
     """(25), misprints corrected, see docs/errata.md; the normal force is left out of g2."""
     h = s.h
     theta_1 = s.theta_1
@@ -66,7 +63,7 @@ def prepare(c: Coefficients, s: Weights, state: Any, problem: Any) -> None:
 
 
 @kernel
-def finish(c: Coefficients, s: Weights, state: Any, problem: Any, contact: Any, work: Any) -> None:
+def finish(c: Coefficients, s: Weights, state: State, problem: Problem, contact: Contact, work: Works) -> None:
     """(21)-(22), and the works of the step: the scheme times the displacement of the step.
 
     m (p' - p)/h dx = change of kinetic energy + m (theta_2 - 1/2)|p' - p|², and the links likewise with

@@ -100,7 +100,7 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
     reached = motion.time
     if reached > start:
         return None
-    equilibrium = np.array(o.rest)
+    equilibrium = np.array(o.equilibrium)
     values = theory.values
     vectors = theory.vectors
     parts = np.linalg.solve(vectors, motion.state - equilibrium)
