@@ -19,6 +19,7 @@ from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.point import Point
 from brakecli.analysis.branches.problem import Array, Evaluation, Guess, Problem, steps_in_p
 from brakecli.errors import CaseError
+from brakecli.solver.block import Block
 from brakecli.solver.motion.events import DONE, EVENTFUL, GRAZED
 from brakecli.solver.motion.flow import Orbit, SmoothFlow
 from brakecli.solver.phases import BACKWARD, FORWARD, OPEN, STICK
@@ -48,7 +49,7 @@ class Flow(Protocol):
     """What carries a state over a span; what it says is that of the last span. `SmoothFlow` says it in full."""
 
     @property
-    def path(self) -> Way:
+    def path(self) -> Way | Block:
         """How it has come there."""
 
     @property

@@ -87,7 +87,8 @@ def _bound(followed: Followed, k: int, way: int) -> Bound:
     """Where the stable part ends whose last point that way is the one at k."""
     branch = followed.branch
     problem = followed.problem
-    assert branch is not None and problem is not None
+    assert branch is not None
+    assert problem is not None
     point = branch.points[k]
     if not 0 <= k + way < len(branch.points):
         return Bound(point.p, known=branch.ended[1 if way > 0 else 0].kind not in CUT)

@@ -76,11 +76,11 @@ def amplification(c: Coefficients, s: Weights, scheme: SteppingModule, contact_s
         state.force = problem.load = contact_stiffness
         problem.belt_now = problem.belt_next = 1e3 / s.h  # a belt so fast that nothing sticks
         if moved is not None:
-            state[moved] += by
+            setattr(state, moved, getattr(state, moved) + by)
         scheme.prepare(loaded, s, state, problem)
         newton(*layer, problem, MOST_EVALUATIONS["newton"])
         scheme.finish(loaded, s, state, problem, layer.contact, new(Works))
-        return np.array([state[name] for name in scheme.MEMORY]) / scales
+        return np.array([getattr(state, name) for name in scheme.MEMORY]) / scales
 
     neighbours = [step(name, DIFFERENCE * scale) for name, scale in zip(scheme.MEMORY, scales, strict=True)]
     matrix: Floats = (np.array(neighbours) - step()).T / DIFFERENCE
