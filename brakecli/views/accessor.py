@@ -53,7 +53,7 @@ _APART = {
     "indices_of",
 }
 _KINDS = STABILITY, THRESHOLDS, LOCK_IN, BRANCH, SCATTER, fields.SWEEP
-_TOLD = {each.name: each for kind in _KINDS for each in kind if each.name not in _APART}
+_SHOWN_FIELDS = {field.name: field for kind in _KINDS for field in kind if field.name not in _APART}
 """What a table says of a result that is no verdict."""
 
 
@@ -109,10 +109,10 @@ class Differences(Difference, Shown):
 class Accessor(Shown):
     """`result.brakecli`: typed records of a result of `brakecli`, its table, its picture, and its file."""
 
-    def __init__(self, found: xr.Dataset | xr.DataTree) -> None:
+    def __init__(self, result: xr.Dataset | xr.DataTree) -> None:
         """Read nothing yet."""
-        self._found = found
-        self._groups = dict(found.children) if isinstance(found, xr.DataTree) else {}
+        self._result = result
+        self._groups = dict(result.children) if isinstance(result, xr.DataTree) else {}
 
     def save(self, path: str | PathLike[str], force: bool = False) -> None:
         """Keep the result as a file, as the commands write it, which replaces another one where `force` is set.
@@ -121,7 +121,7 @@ class Accessor(Shown):
         numbers, and without NaN in a history. Raises UsageError for what is no result, and CannotWriteError.
         """
         with in_python():
-            save(self._found, Path(path), force=force)
+            save(self._result, Path(path), force=force)
 
     @property
     def reasons(self) -> tuple[str, ...]:
@@ -168,35 +168,35 @@ class Accessor(Shown):
     @property
     def attractors(self) -> tuple[Attractor, ...]:
         """Of a sweep over initial states: each motion that its points come to, and their share."""
-        found = json.loads(self._found.attrs.get("attractors", "[]"))
+        attractors = json.loads(self._result.attrs.get("attractors", "[]"))
         if "attractors" in self._groups:
-            found = self._rows("attractors", fields.ATTRACTOR)
-        for each in found:
-            each["share"] = Probability(*map(each.pop, ("share", "share_lower", "share_upper")))
-        return tuple(Attractor(**each) for each in found)
+            attractors = self._rows("attractors", fields.ATTRACTOR)
+        for attractor in attractors:
+            attractor["share"] = Probability(*map(attractor.pop, ("share", "share_lower", "share_upper")))
+        return tuple(Attractor(**attractor) for attractor in attractors)
 
     def view(self, show: Renderer) -> View:
         """Its answer, its single numbers, and what is said of it; a verdict as `brakecli classify` shows it."""
-        single = {name: each.item() for name, each in self._found.data_vars.items() if not each.ndim}
-        held = {str(name): _known(value) for name, value in (self._found.attrs | single).items()}
-        title = str(held.get("title") or "")
-        if "excitation" in held:
-            lists = {name: [vars(each) for each in getattr(self, name)] for name in ("vibrations", "bursts")}
+        single = {name: variable.item() for name, variable in self._result.data_vars.items() if not variable.ndim}
+        contents = {str(name): _without_numpy(value) for name, value in (self._result.attrs | single).items()}
+        title = str(contents.get("title") or "")
+        if "excitation" in contents:
+            lists = {name: [vars(record) for record in getattr(self, name)] for name in ("vibrations", "bursts")}
             return of_verdict(
-                {**held, **lists, "reasons": self.reasons, "evidence": self._evidence()}, title, show
+                {**contents, **lists, "reasons": self.reasons, "evidence": self._evidence()}, title, show
             )
-        if "undamped_flutter_friction" in held:
+        if "undamped_flutter_friction" in contents:
             objects = {name: self._parsed(name) for name in ("modes", "crossings", "equilibrium", "discrete")}
-            return of_stability({**held, **objects}, title, show)
-        answer = [str(held.get("sentence") or "")]
-        if "regime" in self._found:
-            regimes = Counter(np.ravel(self._found["regime"]).astype(str).tolist())
+            return of_stability({**contents, **objects}, title, show)
+        answer = [str(contents.get("sentence") or "")]
+        if "regime" in self._result:
+            regimes = Counter(np.ravel(self._result["regime"]).astype(str).tolist())
             answer.append(regimes_sentence(dict(sorted(regimes.items())), regimes.total()))
-        told = [each for name, each in _TOLD.items() if name in held]
-        rows = [Row(field.title, show.field(field, held[field.name])) for field in told]
+        shown = [field for name, field in _SHOWN_FIELDS.items() if name in contents]
+        rows = [Row(field.title, show.field(field, contents[field.name])) for field in shown]
         rows += [
-            Row(f"attractor {each.attractor}", f"{each.regime}, {each.share.value:.1%}")
-            for each in self.attractors
+            Row(f"attractor {attractor.attractor}", f"{attractor.regime}, {attractor.share.value:.1%}")
+            for attractor in self.attractors
         ]
         branches = [group for group in self._groups.values() if "kind" in group.attrs]
         rows += [Row(str(one.name), f"{one.attrs['kind']}, {one.sizes['point']} motions") for one in branches]
@@ -206,19 +206,20 @@ class Accessor(Shown):
     def _evidence(self) -> dict[str, Any]:
         """The numbers by which a verdict was decided."""
         if "regime" in self._groups and "evidence" in self._groups["regime"].children:
-            return {str(name): _known(value) for name, value in self._groups["regime"]["evidence"].attrs.items()}
+            evidence = self._groups["regime"]["evidence"].attrs
+            return {str(name): _without_numpy(value) for name, value in evidence.items()}
         return dict(self._parsed("evidence") or {})
 
     def _parsed(self, name: str) -> Any:
         """A list or an object among the attributes."""
-        given = self._found.attrs.get(name)
-        return json.loads(given) if isinstance(given, str) and given else given
+        value = self._result.attrs.get(name)
+        return json.loads(value) if isinstance(value, str) and value else value
 
     def _repr_png_(self) -> bytes | None:
         from brakecli.views.plots.result import plot_result
 
         try:
-            with stored(self._found, "result.h5") as path:
+            with stored(self._result, "result.h5") as path:
                 picture = path.with_suffix(".png")
                 plot_result(path, picture, force=True)
                 return picture.read_bytes()
@@ -227,23 +228,23 @@ class Accessor(Shown):
 
     def _texts(self, name: str) -> tuple[str, ...]:
         """A list of texts; xarray has saved one of a single text as this text."""
-        given = self._found.attrs.get(name, ())
-        return (given,) if isinstance(given, str) else tuple(map(str, given))
+        texts = self._result.attrs.get(name, ())
+        return (texts,) if isinstance(texts, str) else tuple(map(str, texts))
 
     def _rows(self, group: str, columns: Sequence[Field]) -> list[dict[str, Any]]:
         """The rows of a group, by the names of its columns."""
-        held = self._groups[group].to_dataset()
-        values = {each.name: map(_known, held[each.name].values.tolist()) for each in columns}
+        dataset = self._groups[group].to_dataset()
+        values = {column.name: map(_without_numpy, dataset[column.name].values.tolist()) for column in columns}
         return [dict(zip(values, row, strict=True)) for row in zip(*values.values(), strict=True)]
 
     def _records(self, name: str, kind: type[_Record]) -> tuple[_Record, ...]:
         """A list of objects, or a single one, as records."""
-        given = self._found.attrs.get(name, ())
-        found = json.loads(given) if isinstance(given, str) else given
-        return tuple(kind(**each) for each in ([found] if isinstance(found, dict) else found))
+        stored_records = self._result.attrs.get(name, ())
+        records = json.loads(stored_records) if isinstance(stored_records, str) else stored_records
+        return tuple(kind(**record) for record in ([records] if isinstance(records, dict) else records))
 
 
-def _known(value: Any) -> Any:
+def _without_numpy(value: Any) -> Any:
     """A value without NumPy; None where there is none."""
     value = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return None if value != value or value == "" else value  # NaN

@@ -22,13 +22,13 @@ SHORT = 2
 """Keys of the case of which a short answer says how they differ, and one number more."""
 
 
-def of_check(found: Check, title: str, show: Renderer) -> View:
+def of_check(check: Check, title: str, show: Renderer) -> View:
     """What a run would take and which limits it meets."""
-    system = found.system
-    limits = found.limits
-    has_step = found.step is not None
+    system = check.system
+    limits = check.limits
+    has_step = check.step is not None
     low, high = system.natural_frequencies
-    link_low, link_high = found.link_frequencies
+    link_low, link_high = check.link_frequencies
     coefficients = zip(COEFFICIENTS.values(), system.coefficients, strict=True)
     rows = [
         *(
@@ -40,64 +40,65 @@ def of_check(found: Check, title: str, show: Renderer) -> View:
         Row("natural frequencies", f"{low:.5g} and {high:.5g} Hz in full contact"),
         Row("without contact", f"{link_low:.5g} and {link_high:.5g} Hz"),
         Row("shortest wave passes at", show.text(system.passing_frequency or None, "Hz")),
-        Row("step", (f"{found.step:.6g} s, " if has_step else "its own, about ") + f"{found.steps:.15g} steps"),
+        Row("step", (f"{check.step:.6g} s, " if has_step else "its own, about ") + f"{check.steps:.15g} steps"),
     ]
     if has_step:
         rows += [
-            Row("steps per period", f"{found.steps_per_period:.4g} of the fastest motion"),
+            Row("steps per period", f"{check.steps_per_period:.4g} of the fastest motion"),
             Row("fixed-point contraction", f"{limits.contraction:.3g} (1 or more: it may diverge)"),
             Row("solution of each step", "unique" if limits.unique else "perhaps not unique"),
             Row("scheme", f"multiplies a frictionless disturbance by at most {limits.growth:.8g} a step"),
         ]
     rows += [
         Row("contact", system.evaluator + (f", {system.nodes} nodes" if system.nodes else "")),
-        Row("nodes per shortest wave", show.text(found.nodes_per_wave)),
-        *_bytes(found),
-        *(Row("adjusted", each) for each in found.adjustments),
+        Row("nodes per shortest wave", show.text(check.nodes_per_wave)),
+        *_bytes(check),
+        *(Row("adjusted", adjustment) for adjustment in check.adjustments),
     ]
     return View(title, blocks=rows)
 
 
-def of_size(found: Size, title: str) -> View:
+def of_size(size: Size, title: str) -> View:
     """What a sweep would take."""
-    return View(title, blocks=[Row("points", str(found.points)), *_workers(found), *_bytes(found)])
+    return View(title, blocks=[Row("points", str(size.points)), *_workers(size), *_bytes(size)])
 
 
-def of_study_size(study: Study, counts: Mapping[str, int], found: Size, title: str) -> View:
+def of_study_size(study: Study, counts: Mapping[str, int], size: Size, title: str) -> View:
     """What a study would take; `counts` are its samples and those of its indices."""
-    laws = [f"{' and '.join(each.paths)} ({each.distribution})" for each in study.parameter]
-    each = "growth and frequency of its least stable mode, and its critical friction, by eigenvalues"
+    laws = [f"{' and '.join(law.paths)} ({law.distribution})" for law in study.parameter]
+    computed = "growth and frequency of its least stable mode, and its critical friction, by eigenvalues"
     if study.method == "run":
-        each = "a run with its verdict, and its critical friction by eigenvalues"
+        computed = "a run with its verdict, and its critical friction by eigenvalues"
     more = counts["index_samples"]
     indices = f"on {study.indices_of.replace('_', ' ')}, by {more} samples more" if more else "not asked"
     rows = [
         Row("samples", str(counts["samples"])),
         Row("scatters", ", ".join(laws)),
-        Row("of each sample", each),
+        Row("of each sample", computed),
         Row("squeal", "at {:g} to {:g} Hz".format(*study.band) if study.band else "at any frequency"),
         Row("what decides", indices),
     ]
-    return View(title, blocks=[*rows, *_workers(found), *_bytes(found)])
+    return View(title, blocks=[*rows, *_workers(size), *_bytes(size)])
 
 
-def _workers(found: Size) -> list[Row]:
-    return [Row("workers", str(found.workers or "none, as they would take longer to start"))]
+def _workers(size: Size) -> list[Row]:
+    return [Row("workers", str(size.workers or "none, as they would take longer to start"))]
 
 
-def _bytes(found: Check | Size) -> list[Row]:
+def _bytes(size: Check | Size) -> list[Row]:
     return [
-        Row("memory", f"about {found.memory / 1e6:.0f} MB"),
-        Row("file", f"about {found.file_size / 1e6:.2g} MB"),
+        Row("memory", f"about {size.memory / 1e6:.0f} MB"),
+        Row("file", f"about {size.file_size / 1e6:.2g} MB"),
     ]
 
 
 def of_info(numbers: Mapping[str, Any]) -> View:
     """Contents of a file, a row for each group of variables."""
     groups: dict[str, list[str]] = {}
-    for each in numbers["variables"]:
-        sizes = " x ".join(f"{name} {size}" for name, size in zip(each["dims"], each["shape"], strict=True))
-        groups.setdefault(f"{each['group']}: {sizes}", []).append(each["name"])
+    for variable in numbers["variables"]:
+        lengths = zip(variable["dims"], variable["shape"], strict=True)
+        sizes = " x ".join(f"{name} {length}" for name, length in lengths)
+        groups.setdefault(f"{variable['group']}: {sizes}", []).append(variable["name"])
     made = ", ".join(f"{name} {version}" for name, version in numbers["versions"].items())
     rows = [
         Row("kind", str(numbers["kind"]) + (f", {numbers['status']}" if numbers["status"] else "")),
@@ -113,31 +114,31 @@ def of_info(numbers: Mapping[str, Any]) -> View:
 def of_difference(numbers: Mapping[str, Any], files: Mapping[str, str], show: Renderer) -> View:
     """What differs in a sentence; the main keys and numbers, and on demand all, each side by side."""
     blocks: list[Row | Table] = []
-    for part, shown in (("case", SHORT), ("numbers", SHORT + 1), ("versions", 0)):
-        rows = [each for each in numbers[part] if not each["name"].startswith(_ASIDE)]
-        rows.sort(key=lambda each: _MAIN.index(each["name"]) if each["name"] in _MAIN else len(_MAIN))
+    for topic, shown in (("case", SHORT), ("numbers", SHORT + 1), ("versions", 0)):
+        rows = [row for row in numbers[topic] if not row["name"].startswith(_ASIDE)]
+        rows.sort(key=lambda row: _MAIN.index(row["name"]) if row["name"] in _MAIN else len(_MAIN))
         if rows:
-            blocks.append(_sides(part, rows, files, show, shown))
-        if more := sum(each["name"] != "title" for each in numbers[part]) - len(rows):
+            blocks.append(_sides(topic, rows, files, show, shown))
+        if more := sum(row["name"] != "title" for row in numbers[topic]) - len(rows):
             what = f"{more} more with reasons and evidence differ; --json lists them"
-            blocks.append(Row(part, what, detail=True))
-    alike = [each for each in numbers["variables"] if each["compared"] and not each["different"]]
-    variables = [each for each in numbers["variables"] if each not in alike]
+            blocks.append(Row(topic, what, detail=True))
+    alike = [variable for variable in numbers["variables"] if variable["compared"] and not variable["different"]]
+    variables = [variable for variable in numbers["variables"] if variable not in alike]
     if variables:
         columns = {
-            "variable": [_place(each) for each in variables],
-            "differ": [f"{each['different']} of {each['compared']}" for each in variables],
-            "by at most": [text_of(each["largest"], each["units"], ".3g") for each in variables],
-            "of the largest": [text_of(each["relative"], form=".2%") for each in variables],
-            "shapes": [_shapes(each) for each in variables],
+            "variable": [_path(variable) for variable in variables],
+            "differ": [f"{variable['different']} of {variable['compared']}" for variable in variables],
+            "by at most": [text_of(variable["largest"], variable["units"], ".3g") for variable in variables],
+            "of the largest": [text_of(variable["relative"], form=".2%") for variable in variables],
+            "shapes": [_shapes(variable) for variable in variables],
         }
-        if all(each["shapes"][0] == each["shapes"][1] for each in variables):
+        if all(variable["shapes"][0] == variable["shapes"][1] for variable in variables):
             del columns["shapes"]
         blocks.append(Table(columns, first=0))
     if alike:
-        named = ", ".join(f"{_place(each)} ({_shapes(each)})" for each in alike)
+        named = ", ".join(f"{_path(variable)} ({_shapes(variable)})" for variable in alike)
         blocks.append(Row("alike", f"the same where both have values, of different lengths: {named}", detail=True))
-    if along := {each["interpolated"]: None for each in numbers["variables"] if each["interpolated"]}:
+    if along := {variable["interpolated"]: None for variable in numbers["variables"] if variable["interpolated"]}:
         how = f"compared at equal {' and '.join(along)}; the finer result is interpolated"
         blocks.append(Row("places", how, detail=True))
     if files["output"]:
@@ -149,9 +150,9 @@ def _sides(
     what: str, rows: list[Mapping[str, Any]], files: Mapping[str, str], show: Renderer, first: int
 ) -> Table:
     """Names, and the values of both files."""
-    columns = {what: [each["name"] for each in rows]}
+    columns = {what: [row["name"] for row in rows]}
     for side in ("a", "b"):
-        columns[files[side]] = [_value(each[side], each.get("units"), show) for each in rows]
+        columns[files[side]] = [_value(row[side], row.get("units"), show) for row in rows]
     return Table(columns, first=first)
 
 
@@ -161,7 +162,7 @@ def _value(value: Any, units: str | None, show: Renderer) -> str:
     return value_text(value).strip('"')
 
 
-def _place(variable: Mapping[str, Any]) -> str:
+def _path(variable: Mapping[str, Any]) -> str:
     return f"{variable['group']}/{variable['name']}".replace("//", "")
 
 

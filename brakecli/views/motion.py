@@ -79,10 +79,10 @@ def of_verdict(numbers: Mapping[str, Any], source: str, show: Renderer) -> View:
 def of_verdicts(results: Sequence[Mapping[str, Any]]) -> View:
     """The verdicts on several files, one in a row."""
     columns = {
-        "file": [each["source"] for each in results],
-        "regime": [each.get("regime", "unreadable") for each in results],
-        "Hz": [_tone(each, text_of(each.get("frequency"), form=".5g")) for each in results],
-        "because": [each.get("error") or "; ".join(each["reasons"]) for each in results],
+        "file": [verdict["source"] for verdict in results],
+        "regime": [verdict.get("regime", "unreadable") for verdict in results],
+        "Hz": [_tone(verdict, text_of(verdict.get("frequency"), form=".5g")) for verdict in results],
+        "because": [verdict.get("error") or "; ".join(verdict["reasons"]) for verdict in results],
     }
     return View("", blocks=[Table(columns)])
 
@@ -113,8 +113,8 @@ def motion_sentence(numbers: Mapping[str, Any], show: Renderer, *, full: bool = 
 def reasons_of(numbers: Mapping[str, Any], show: Renderer) -> list[str]:
     """Why the regime is what it is; lengths have the prefix that they have elsewhere."""
     return [
-        _LENGTH.sub(lambda found: show.text(float(found[1]), "m"), str(each))
-        for each in numbers.get("reasons", ())
+        _LENGTH.sub(lambda length: show.text(float(length[1]), "m"), str(reason))
+        for reason in numbers.get("reasons", ())
     ]
 
 
@@ -122,13 +122,13 @@ def _named_numbers(numbers: Mapping[str, Any], show: Renderer) -> list[str]:
     """The numbers of a vibration as parts of a sentence."""
     if (frequency := numbers.get("frequency")) is None:
         return []
-    found = [f"at {frequency:.4g} Hz"]
+    phrases = [f"at {frequency:.4g} Hz"]
     if (amplitude := numbers.get("amplitude")) is not None:
-        found.append(f"amplitude along the wheel {show.text(float(f'{amplitude:.3g}'), 'm')}")
+        phrases.append(f"amplitude along the wheel {show.text(float(f'{amplitude:.3g}'), 'm')}")
     for name, what in (("stick_fraction", "stick"), ("contact_loss_fraction", "no contact")):
         if share := numbers.get(name):
-            found.append(f"{what} {share:.1%} of the time")
-    return found
+            phrases.append(f"{what} {share:.1%} of the time")
+    return phrases
 
 
 def _while_it_changes(numbers: Mapping[str, Any], show: Renderer) -> str:
@@ -137,10 +137,10 @@ def _while_it_changes(numbers: Mapping[str, Any], show: Renderer) -> str:
     if not intervals:
         return ""
     said = []
-    for each in intervals[:MOST_SAID]:
-        tone = "" if each["frequency"] is None else f"{show.text(each['frequency'], 'Hz')}, "
-        most = f"{tone}{show.text(each['amplitude'], 'm')}, most at {show.text(each['speed'], 'm/s')}"
-        said.append(f"from {each['start']:.4g} to {each['end']:.4g} s ({most})")
+    for interval in intervals[:MOST_SAID]:
+        tone = "" if interval["frequency"] is None else f"{show.text(interval['frequency'], 'Hz')}, "
+        most = f"{tone}{show.text(interval['amplitude'], 'm')}, most at {show.text(interval['speed'], 'm/s')}"
+        said.append(f"from {interval['start']:.4g} to {interval['end']:.4g} s ({most})")
     more = f", and in {len(intervals) - MOST_SAID} more intervals" * (len(intervals) > MOST_SAID)
     stands = (numbers.get("evidence") or {}).get("wheel_stands")
     after = ", then rests" if stands else ""
@@ -167,20 +167,20 @@ def _numbers(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
     if numbers.get("frequency") is not None:
         rows.append(Row("frequency", _tone(numbers, show.text(numbers["frequency"], "Hz"))))
     spread = numbers.get("amplitude_spread")
-    known = numbers.get("amplitude")
-    if known is not None:
-        amplitude = show.with_error(known, spread if spread is not None and spread < known else None, "m")
+    size = numbers.get("amplitude")
+    if size is not None:
+        amplitude = show.with_error(size, spread if spread is not None and spread < size else None, "m")
         rows.append(Row("amplitude of x", amplitude + _when(numbers), detail=changes))
-    shares = _known(numbers, "stick_fraction", "contact_loss_fraction")
-    for each, share in shares:
-        aside_here = changes and each.name != "stick_fraction"
-        rows.append(Row(each.title, show.field(each, share), detail=aside_here or not share))
+    shares = _fields_with_values(numbers, "stick_fraction", "contact_loss_fraction")
+    for field, share in shares:
+        aside_here = changes and field.name != "stick_fraction"
+        rows.append(Row(field.title, show.field(field, share), detail=aside_here or not share))
     aside = [Row("regime", str(numbers.get("regime", "")))]
-    told = [name for name in _ASIDE if name != "ringing_frequency" or numbers.get("damping_ratio") is None]
-    aside += [Row(each.title, show.field(each, value)) for each, value in _known(numbers, *told)]
-    intervals = numbers.get("vibrations") or ()
-    aside += [Row("vibrates", f"{each['start']:.4g} to {each['end']:.4g} s") for each in intervals[MOST_SAID:]]
-    aside += [Row("disturbances", each) for each in disturbances(numbers)]
+    names = [name for name in _ASIDE if name != "ringing_frequency" or numbers.get("damping_ratio") is None]
+    aside += [Row(field.title, show.field(field, value)) for field, value in _fields_with_values(numbers, *names)]
+    unsaid = (numbers.get("vibrations") or ())[MOST_SAID:]
+    aside += [Row("vibrates", f"{interval['start']:.4g} to {interval['end']:.4g} s") for interval in unsaid]
+    aside += [Row("disturbances", text) for text in disturbances(numbers)]
     return [*rows, *details(*aside)]
 
 
@@ -198,8 +198,8 @@ def _ringing(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
 def _torque(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
     """The mean braking torque and its variation, where they are known."""
     when = {"torque_variation": _when(numbers)}
-    known = _known(numbers, *_TORQUE)
-    return [Row(each.title, show.field(each, value) + when.get(each.name, "")) for each, value in known]
+    values = _fields_with_values(numbers, *_TORQUE)
+    return [Row(field.title, show.field(field, value) + when.get(field.name, "")) for field, value in values]
 
 
 def _when(numbers: Mapping[str, Any]) -> str:
@@ -208,10 +208,10 @@ def _when(numbers: Mapping[str, Any]) -> str:
     return ", in the last tenth" * (run and numbers.get("excitation") == Excitation.NONE)
 
 
-def _known(numbers: Mapping[str, Any], *names: str) -> list[tuple[Field, Any]]:
+def _fields_with_values(numbers: Mapping[str, Any], *names: str) -> list[tuple[Field, Any]]:
     """The fields of a verdict that have a value, with it."""
     declared = named(fields.VERDICT, *names)
-    return [(each, numbers[each.name]) for each in declared if numbers.get(each.name) is not None]
+    return [(field, numbers[field.name]) for field in declared if numbers.get(field.name) is not None]
 
 
 def _certificate(numbers: Mapping[str, Any]) -> list[Row]:
@@ -220,9 +220,9 @@ def _certificate(numbers: Mapping[str, Any]) -> list[Row]:
     certified = numbers.get("certified")
     if certified is None and error is None:
         return []
-    found = "not known" if error is None else f"{'at most ' if certified else ''}{error:.1e} of its largest value"
+    bound = "not known" if error is None else f"{'at most ' if certified else ''}{error:.1e} of its largest value"
     by = numbers.get("certified_by")
-    return [Row("numerical error of the motion", found), *details(*[Row("known by", str(by))] * bool(by))]
+    return [Row("numerical error of the motion", bound), *details(*[Row("known by", str(by))] * bool(by))]
 
 
 def _scheme(numbers: Mapping[str, Any]) -> str:
@@ -255,5 +255,5 @@ def disturbances(numbers: Mapping[str, Any]) -> list[str]:
     if rate is None or error is None:
         return []
     what = "fade" if rate < 0.0 else "grow"
-    known = "" if abs(rate) > Thresholds.sure_errors * error else ", which is not told from 0"
-    return [f"small ones {what} at {abs(rate):.3g} ± {error:.2g} 1/s{known}"]
+    doubt = "" if abs(rate) > Thresholds.sure_errors * error else ", which is not told from 0"
+    return [f"small ones {what} at {abs(rate):.3g} ± {error:.2g} 1/s{doubt}"]

@@ -42,21 +42,21 @@ ENTRIES = (
 
 def of_sweep(report: SweepReport, show: Renderer) -> View:
     """What the points of a sweep come to, where that changes, and every point of a small one."""
-    found = report.findings
+    findings = report.findings
     blocks: list[Row | Table] = []
-    if found.points <= MOST_LISTED_POINTS:
+    if findings.points <= MOST_LISTED_POINTS:
         blocks.append(_points(report, show))
-    if found.attractors:
-        blocks.append(_attractors(found.attractors))
+    if findings.attractors:
+        blocks.append(_attractors(findings.attractors))
     blocks += _stretches(report)
-    blocks += [Row("note", each) for each in found.sentences]
-    if found.failed:
-        blocks.append(Row("failed", f"{found.failed} points"))
+    blocks += [Row("note", note) for note in findings.sentences]
+    if findings.failed:
+        blocks.append(Row("failed", f"{findings.failed} points"))
     speed = report.points_per_second
     cost = f": {speed:.3g} points/s, {report.overhead:.0%} of the time not on points" if speed else ""
     resumed = f", {report.resumed} of them computed before" if report.resumed else ""
-    hidden = f"; listed with {argument('details')}" * (SHORT_POINTS < found.points <= MOST_LISTED_POINTS)
-    blocks.append(Row("points", f"{found.points}{resumed}{hidden}"))
+    hidden = f"; listed with {argument('details')}" * (SHORT_POINTS < findings.points <= MOST_LISTED_POINTS)
+    blocks.append(Row("points", f"{findings.points}{resumed}{hidden}"))
     blocks += details(Row("time", text_of(report.seconds, "s", ".3g") + cost))
     blocks.append(Row("file", str(report.output)))
     return View(report.loaded.title, sentences(_answer(report, show)), blocks)
@@ -64,27 +64,27 @@ def of_sweep(report: SweepReport, show: Renderer) -> View:
 
 def regimes_sentence(regimes: Mapping[str, int], size: int) -> str:
     """At how many points it vibrates, and the regimes of all."""
-    lasting = sum(regimes.get(each, 0) for each in (Regime.RELAXATION, Regime.QUASI_HARMONIC))
-    each = ", ".join(f"{name} at {count}" for name, count in regimes.items() if name)
-    return f"it vibrates at {lasting} of {size} points: {each}"
+    lasting = sum(regimes.get(regime, 0) for regime in (Regime.RELAXATION, Regime.QUASI_HARMONIC))
+    counts = ", ".join(f"{name} at {count}" for name, count in regimes.items() if name)
+    return f"it vibrates at {lasting} of {size} points: {counts}"
 
 
 def _answer(report: SweepReport, show: Renderer) -> list[str]:
     """What the points say as a whole."""
-    found = report.findings
+    findings = report.findings
     sought = report.loaded.sweep.critical
-    if sought is None or found.critical is None:
-        return [regimes_sentence(found.regimes, found.points)]
-    if found.points == 1 and (said := [each for each in (found.variables or {})["critical_sentence"] if each]):
+    if sought is None or findings.critical is None:
+        return [regimes_sentence(findings.regimes, findings.points)]
+    if findings.points == 1 and (said := [*filter(None, (findings.variables or {})["critical_sentence"])]):
         return [str(said[0])]
-    count, least, largest = found.critical
+    count, least, largest = findings.critical
     span = ""
     if count > 1:
         span = f", from {show.text(least)}{_where(report, least)} to {show.text(largest)}{_where(report, largest)}"
     elif count:
         span = f": {show.text(least)}{_where(report, least)}"
     return [
-        f"a critical {sought.parameter} is found at {count} of {found.points} points{span}",
+        f"a critical {sought.parameter} is found at {count} of {findings.points} points{span}",
         *_beside(report, show),
     ]
 
@@ -120,19 +120,19 @@ def _stretches(report: SweepReport) -> list[Row]:
     """Along a single axis: the stretches of equal regimes, where the points are too many to be listed."""
     from brakecli.studies.sweeps.plan import label
 
-    found = report.findings
+    findings = report.findings
     axes = report.loaded.plan.sweep.axis
-    both_ways = "direction" in found.dimensions  # of which hysteresis is said
+    both_ways = "direction" in findings.dimensions  # of which hysteresis is said
     if (
         len(axes) != 1
         or both_ways
-        or found.variables is None
-        or found.critical is not None
-        or found.points <= SHORT_POINTS
+        or findings.variables is None
+        or findings.critical is not None
+        or findings.points <= SHORT_POINTS
     ):
         return []
-    regimes = np.ravel(np.array(found.variables["regime"], object)).tolist()
-    values = [label(axes[0].value(place)) for place in range(axes[0].size)]
+    regimes = np.ravel(np.array(findings.variables["regime"], object)).tolist()
+    values = [label(axes[0].value(index)) for index in range(axes[0].size)]
     parts = []
     for regime, stretch in groupby(zip(regimes, values, strict=True), key=itemgetter(0)):
         ends = [value for _, value in stretch]
@@ -145,30 +145,30 @@ def _points(report: SweepReport, show: Renderer) -> Table:
     """A row for each point: its place on the axes, and what was found there."""
     from brakecli.studies.sweeps.plan import label
 
-    found = report.findings
+    findings = report.findings
     plan = report.loaded.plan
-    variables = found.variables or {}
-    places = [plan.places(point % plan.points) for point in range(found.points)]
+    variables = findings.variables or {}
+    positions = [plan.places(point % plan.points) for point in range(findings.points)]
     columns: dict[str, list[str]] = {}
-    if "direction" in found.dimensions:
-        columns["way"] = [("up", "down")[point // plan.points] for point in range(found.points)]
+    if "direction" in findings.dimensions:
+        columns["way"] = [("up", "down")[point // plan.points] for point in range(findings.points)]
     for number, axis in enumerate(plan.sweep.axis):
-        columns[axis.parameter[0]] = [label(axis.value(place[number])) for place in places]
+        columns[axis.parameter[0]] = [label(axis.value(position[number])) for position in positions]
     if plan.listed is not None:
         for key, column in zip(plan.listed.keys, plan.listed.columns, strict=True):
-            columns[key] = [label(each) for each in column]
+            columns[key] = [label(value) for value in column]
     keys = len(columns)
-    known = POINTS
-    if found.critical is not None:
-        known = (*CRITICAL, *(each for each in SEARCHES if _says_more(each, variables)))
-    if found.attractors is not None:
-        known += fields.STARTS
-    for field in known:
+    columns_shown = POINTS
+    if findings.critical is not None:
+        columns_shown = (*CRITICAL, *(field for field in SEARCHES if _says_more(field, variables)))
+    if findings.attractors is not None:
+        columns_shown += fields.STARTS
+    for field in columns_shown:
         values = np.ravel(np.array(variables[field.name], object))
         header = f"{field.title}, {field.units}" if field.units.strip("1") else field.title
         is_error = field.title == "±"
         columns[header] = [text_of(value, form=".2g") if is_error else show.text(value) for value in values]
-    return Table(columns, keys=max(keys, 1), first=None if found.points <= SHORT_POINTS else 0)
+    return Table(columns, keys=max(keys, 1), first=None if findings.points <= SHORT_POINTS else 0)
 
 
 def _says_more(field: Field, variables: Mapping[str, Any]) -> bool:
@@ -182,16 +182,16 @@ def _says_more(field: Field, variables: Mapping[str, Any]) -> bool:
     return bool((differs | (np.isnan(other) != np.isnan(critical))).any())
 
 
-def _attractors(found: Iterable[Attractor]) -> Table:
+def _attractors(attractors: Iterable[Attractor]) -> Table:
     """What the points of a sweep over initial states come to."""
-    each = [values_of(fields.ATTRACTOR, one) for one in found]
+    rows = [values_of(fields.ATTRACTOR, row) for row in attractors]
     columns = {
-        "attractor": [str(one["attractor"]) for one in each],
-        "regime": [one["regime"] for one in each],
-        "Hz": [text_of(one["frequency"], form=".4g") for one in each],
-        "amplitude of x, m": [text_of(one["amplitude"], form=".4g") for one in each],
-        "share": [f"{one['share']:.1%}" for one in each],
-        "95 % interval": [f"{one['share_lower']:.1%} to {one['share_upper']:.1%}" for one in each],
+        "attractor": [str(row["attractor"]) for row in rows],
+        "regime": [row["regime"] for row in rows],
+        "Hz": [text_of(row["frequency"], form=".4g") for row in rows],
+        "amplitude of x, m": [text_of(row["amplitude"], form=".4g") for row in rows],
+        "share": [f"{row['share']:.1%}" for row in rows],
+        "95 % interval": [f"{row['share_lower']:.1%} to {row['share_upper']:.1%}" for row in rows],
     }
     return Table(columns)
 
@@ -203,10 +203,10 @@ def of_comparison(numbers: Mapping[str, Any], keys: Mapping[str, Any], title: st
     """
     best = numbers["recommended"]
     target = numbers["target_error"]
-    able = [each for each in numbers["entries"] if each["error"] is not None]
-    front = sorted((each for each in able if each["on_front"]), key=lambda each: each["wall_seconds"] or 0.0)
-    finest = {_method(each): each for each in able if not each["on_front"]}
-    failed = [each for each in numbers["entries"] if each["steps"] and each["error"] is None]
+    able = [entry for entry in numbers["entries"] if entry["error"] is not None]
+    front = sorted((entry for entry in able if entry["on_front"]), key=lambda entry: entry["wall_seconds"] or 0.0)
+    finest = {_method(entry): entry for entry in able if not entry["on_front"]}
+    failed = [entry for entry in numbers["entries"] if entry["steps"] and entry["error"] is None]
     answer = [f"no method meets the wanted error of {target:g}"]
     if best is not None:
         said = f"recommended is {_entry(best)}"
@@ -216,11 +216,11 @@ def of_comparison(numbers: Mapping[str, Any], keys: Mapping[str, Any], title: st
             answer.append(f"{chance}; choose a method with more margin")
     blocks: list[Row | Table] = []
     if keys:
-        blocks.append(Row("in a case", ", ".join(f"{key} = {json.dumps(each)}" for key, each in keys.items())))
-    such = [f"{len(failed)} entries, such as {_entry(each)}: {each['failure']}" for each in failed[:1]]
-    blocks += [Row("failed", each) for each in such]
-    if left := numbers["left_out"]:
-        blocks.append(Row("left out", f"{left} entries, because the time was used up; give a larger --budget"))
+        blocks.append(Row("in a case", ", ".join(f"{key} = {json.dumps(value)}" for key, value in keys.items())))
+    such = [f"{len(failed)} entries, such as {_entry(entry)}: {entry['failure']}" for entry in failed[:1]]
+    blocks += [Row("failed", text) for text in such]
+    if skipped := numbers["left_out"]:
+        blocks.append(Row("left out", f"{skipped} entries, because the time was used up; give a larger --budget"))
     if numbers.get("output"):
         blocks.append(Row("file", numbers["output"]))
     repeats = numbers["repeats"]
@@ -241,8 +241,9 @@ def of_comparison(numbers: Mapping[str, Any], keys: Mapping[str, Any], title: st
 def finer_error(entries: Iterable[Mapping[str, Any]], entry: Mapping[str, Any]) -> float:
     """The largest error of the same method at finer steps; above the entry's own, that is low by chance."""
     step = entry["step"] or 0.0
-    finer = [each for each in entries if _method(each) == _method(entry) and (each["step"] or step) < step]
-    return max((each["error"] for each in finer if each["error"] is not None), default=0.0)
+    alike = [other for other in entries if _method(other) == _method(entry)]
+    errors = [other["error"] for other in alike if (other["step"] or step) < step]
+    return max((error for error in errors if error is not None), default=0.0)
 
 
 def _method(entry: Mapping[str, Any]) -> tuple[Any, ...]:
@@ -258,8 +259,9 @@ def _entry(entry: Mapping[str, Any]) -> str:
 
 
 def _entries(records: Iterable[Mapping[str, Any]]) -> dict[str, Sequence[str]]:
-    told = []
-    for each in records:
-        rung = f"to {each['tolerance']:g}" if each["tolerance"] else "exact"
-        told.append({**each, "step": each["step"] or rung, "milliseconds": 1e3 * (each["wall_seconds"] or 0.0)})
-    return {header: [text_of(each[name], form=form) for each in told] for name, header, form in ENTRIES}
+    rows = []
+    for record in records:
+        rung = f"to {record['tolerance']:g}" if record["tolerance"] else "exact"
+        milliseconds = 1e3 * (record["wall_seconds"] or 0.0)
+        rows.append({**record, "step": record["step"] or rung, "milliseconds": milliseconds})
+    return {header: [text_of(row[name], form=form) for row in rows] for name, header, form in ENTRIES}

@@ -22,7 +22,7 @@ class Renderer:
     number: Callable[[Any, str], str]
     none: str = "-"
     most: int = sys.maxsize  # values of a list that are written
-    each: bool = False  # whether each value of a list has its unit; otherwise the last one has
+    units_each: bool = False  # whether each value of a list has its unit; otherwise the last one has
 
     def text(self, value: Any, units: str = "") -> str:
         """A value with its unit; lists and tables in one line."""
@@ -32,11 +32,11 @@ class Renderer:
         if isinstance(value, bool):
             return "yes" if value else "no"
         if isinstance(value, Mapping):
-            return ", ".join(f"{name} {self.text(each)}" for name, each in value.items())
+            return ", ".join(f"{name} {self.text(item)}" for name, item in value.items())
         if hasattr(value, "__len__"):
             more = f" … ({len(value)} values)" * (len(value) > self.most)
-            texts = ", ".join(self.text(each, units * self.each) for each in value[: self.most])
-            return f"{texts} {units * (not self.each)}".rstrip() + more if texts else self.none
+            texts = ", ".join(self.text(item, units * self.units_each) for item in value[: self.most])
+            return f"{texts} {units * (not self.units_each)}".rstrip() + more if texts else self.none
         return self.number(value, units)
 
     def field(self, field: Field, value: Any) -> str:
@@ -55,12 +55,12 @@ class Renderer:
         places = max(0, 1 - math.floor(math.log10(factor * error)))
         return f"{factor * value:.{places}f} ± {factor * error:.{places}f} {unit}".rstrip()
 
-    def rows(self, known: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str, str, str]]:
+    def rows(self, fields: Iterable[Field], values: Mapping[str, Any]) -> list[tuple[str, str, str]]:
         """Title, value and meaning of each field that has a value."""
         return [
-            (each.title, self.field(each, values[each.name]), each.meaning.replace("`", "").replace(" (0, 1)", ""))
-            for each in known
-            if values.get(each.name) is not None
+            (f.title, self.field(f, values[f.name]), f.meaning.replace("`", "").replace(" (0, 1)", ""))
+            for f in fields
+            if values.get(f.name) is not None
         ]
 
 
@@ -89,9 +89,9 @@ def _written(form: str, value: Any, units: str) -> str:
     return f"{value:{form}} {units}".rstrip()
 
 
-TERMINAL = Renderer(partial(_prefixed_text, 4), each=True)
+TERMINAL = Renderer(partial(_prefixed_text, 4), units_each=True)
 """Four digits: the numbers of a brake are known to per cents."""
-EXACT = Renderer(partial(_prefixed_text, 7), each=True)
+EXACT = Renderer(partial(_prefixed_text, 7), units_each=True)
 """What a terminal writes where all is asked for."""
 
 

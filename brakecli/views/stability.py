@@ -34,42 +34,42 @@ def of_stability(numbers: Mapping[str, Any], title: str, show: Renderer, units: 
     modes = numbers["modes"]
     crossings = numbers["crossings"]
     critical = numbers["critical_friction"]
-    rest = numbers["equilibrium"]
+    equilibrium = numbers["equilibrium"]
     answer = [numbers.get("sentence") or _without_loss(numbers), _at_own(numbers, show)]
     rows = [Row("critical friction", _critical(numbers, show))]
-    others = [_crossing(each, show) for each in crossings if each["friction"] != critical]
-    rows += [Row("also changes at", each) for each in others]
+    others = [_crossing(crossing, show) for crossing in crossings if crossing["friction"] != critical]
+    rows += [Row("also changes at", text) for text in others]
     if numbers.get("coexists_from") is not None:
         rows.append(Row("can vibrate from", show.text(numbers["coexists_from"])))
     if numbers.get("barrier") is not None:
         rows.append(Row("barrier", show.text(numbers["barrier"], "m")))
     rows += [Row(f"mode at {show.text(mode['frequency'], 'Hz')}", _mode(mode)) for mode in modes]
-    if rest is not None:
-        sliding = f"y = {show.text(rest['y'] + 0.0, 'm')}, F_y = {show.text(rest['normal_force'], 'N')}"
-        rows.append(
-            Row("steady sliding", f"{sliding}, {100.0 * rest['contact_fraction']:.3g} % of the pad touches")
-        )
+    if equilibrium is not None:
+        position = show.text(equilibrium["y"] + 0.0, "m")
+        force = show.text(equilibrium["normal_force"], "N")
+        touching = f"{100.0 * equilibrium['contact_fraction']:.3g} % of the pad touches"
+        rows.append(Row("steady sliding", f"y = {position}, F_y = {force}, {touching}"))
     undamped = {kind: numbers[f"undamped_{kind}_friction"] for kind in ("flutter", "divergence")}
-    known = [f"{kind} at {show.text(friction)}" for kind, friction in undamped.items() if friction is not None]
+    lost = [f"{kind} at {show.text(friction)}" for kind, friction in undamped.items() if friction is not None]
     stiffness = show.with_error(numbers["contact_stiffness"], numbers["contact_stiffness_error"], "N/m")
     shapes = [Row(f"shape at {show.text(mode['frequency'], 'Hz')}", _shape(mode)) for mode in modes]
     aside = [
         Row("surface speed U", show.text(numbers["belt_speed"], "m/s")),
         Row("contact stiffness K", stiffness),
-        Row("without dashpots", ", ".join(known) or "neither flutter nor divergence"),
+        Row("without dashpots", ", ".join(lost) or "neither flutter nor divergence"),
         Row(f"at φ = {phi:g}", _STATE[numbers["stable"]]),
         *shapes,
     ]
     if numbers.get("pushes"):
         aside.append(Row("search for other vibrations", f"{numbers['pushes']} pushes"))
-    found: list[Row | Table] = [*rows, *_scheme(numbers["discrete"], show), *details(*aside)]
+    blocks: list[Row | Table] = [*rows, *_scheme(numbers["discrete"], show), *details(*aside)]
     if numbers.get("output"):
-        found.append(Row("file", numbers["output"]))
+        blocks.append(Row("file", numbers["output"]))
     if numbers.get("vary"):
         along = of_lock_in(numbers, show, units)
         answer += along.answer
-        found += along.blocks
-    return View(title, sentences(answer), found)
+        blocks += along.blocks
+    return View(title, sentences(answer), blocks)
 
 
 def of_lock_in(numbers: Mapping[str, Any], show: Renderer, units: str) -> View:
@@ -128,10 +128,10 @@ def _scheme(discrete: Mapping[str, Any] | None, show: Renderer) -> list[Row]:
 def _along(entries: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> Table:
     """Critical friction and both modes along a key."""
     columns = {"value": [f"{entry['value']:.6g}" for entry in entries]}
-    columns |= {field.title: [text_of(each[field.name]) for each in entries] for field in fields.VARIED}
+    columns |= {field.title: [text_of(entry[field.name]) for entry in entries] for field in fields.VARIED}
     for field, (head, factor, form) in zip(fields.MODES, _MODES, strict=True):
         for mode in (0, 1):
-            values = [each[field.name][mode] for each in entries]
+            values = [entry[field.name][mode] for entry in entries]
             shown = [None if value is None else factor * value for value in values]
             columns[head.format(mode + 1)] = [text_of(value, form=form) for value in shown]
     return Table(columns, f"Along {', '.join(parameters)}", first=None if len(entries) <= SHORT_POINTS else 0)
@@ -139,7 +139,7 @@ def _along(entries: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> T
 
 def _critical(numbers: Mapping[str, Any], show: Renderer) -> str:
     """The least friction coefficient at which stability is lost, with its error, and how it is lost."""
-    lost = [each for each in numbers["crossings"] if each["friction"] == numbers["critical_friction"]]
+    lost = [crossing for crossing in numbers["crossings"] if crossing["friction"] == numbers["critical_friction"]]
     if not lost:
         return "none"
     error = numbers["critical_error"]
@@ -158,13 +158,13 @@ def _crossing(crossing: Mapping[str, Any], show: Renderer, error: float | None =
 
 def of_advice(report: AdviceReport, show: Renderer) -> View:
     """Whether it squeals, from which friction on, what helps, and what moves the critical friction."""
-    found = report.stability
+    stability = report.stability
     check = report.check
     margin = report.margin
     blocks: list[Row | Table] = []
     wanted = f"{100.0 * report.wanted_margin:.3g} % is wanted"
-    critical = "none" if found.critical is None else show.text(found.critical.friction)
-    far = "" if margin is None else f", {100.0 * margin:+.2g} % from the case's {found.friction:g}; {wanted}"
+    critical = "none" if stability.critical is None else show.text(stability.critical.friction)
+    far = "" if margin is None else f", {100.0 * margin:+.2g} % from the case's {stability.friction:g}; {wanted}"
     blocks.append(Row("critical friction", critical + far, detail=True))
     if under := report.squeal:
         interval = f"{100.0 * under.squeal_lower:.3g} to {100.0 * under.squeal_upper:.3g} %"
@@ -175,16 +175,16 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
     if report.thresholds.barrier is not None:
         blocks += details(Row("barrier", show.text(report.thresholds.barrier, "m")))
     notes = report.notes()
-    blocks += [Row("note", each) for each in notes]
+    blocks += [Row("note", note) for note in notes]
     if check:
         ran = f"{check.parameter} = {check.value:.6g}, {check.duration:.3g} s of motion"
         blocks += details(Row("checked by a run", f"{ran}: {check.verdict.regime}"))
         blocks += details(Row("why", "; ".join(check.verdict.reasons)))
-    if changes := _ordered([each for each in report.advice if each.to is not None], report.mildest):
+    if changes := _ordered([change for change in report.advice if change.to is not None], report.mildest):
         apart = report.mildest not in (None, changes[0].parameter)
         first = max(SHORT_ADVICE - len(notes), 1 + apart)  # a short answer has twelve lines; a note takes one
         blocks.append(Table(_advice(changes, report.squeal), report.ranking, first=first))
-    if vain := [each for each in report.advice if each.to is None]:
+    if vain := [change for change in report.advice if change.to is None]:
         blocks.append(Table(_without_help(vain), "No help within bounds", first=0))
     if moves := _moves(report):
         blocks.append(Table(moves, _MOVES, first=0))
@@ -193,60 +193,60 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
 
 def _ordered(changes: list[Change], mildest: str | None) -> list[Change]:
     """The changes with the one that leaves least squeal second, if it is not first."""
-    rest = [each for each in changes[1:] if each.parameter != mildest]
-    return changes[:1] + [each for each in changes[1:] if each.parameter == mildest] + rest
+    remaining = [change for change in changes[1:] if change.parameter != mildest]
+    return changes[:1] + [change for change in changes[1:] if change.parameter == mildest] + remaining
 
 
 def _without_help(changes: Sequence[Change]) -> dict[str, list[str]]:
     return {
-        "no help": [each.parameter for each in changes],
-        "from": [text_of(each.start) for each in changes],
-        "none in": [f"{each.lowest:.4g} to {each.highest:.4g}" for each in changes],
+        "no help": [change.parameter for change in changes],
+        "from": [text_of(change.start) for change in changes],
+        "none in": [f"{change.lowest:.4g} to {change.highest:.4g}" for change in changes],
     }
 
 
 def _advice(changes: Sequence[Change], drawn: Left | None) -> dict[str, list[str]]:
     columns = {
-        "what helps": [each.parameter for each in changes],
-        "from": [text_of(each.start, form=".4g") for each in changes],
-        "to": [each.rounded for each in changes],
-        "critical φ": [text_of(each.critical_friction, form=".4g") for each in changes],
-        "safe until": [_until(each) for each in changes],
-        "a run is": [each.check or "-" for each in changes],
+        "what helps": [change.parameter for change in changes],
+        "from": [text_of(change.start, form=".4g") for change in changes],
+        "to": [change.rounded for change in changes],
+        "critical φ": [text_of(change.critical_friction, form=".4g") for change in changes],
+        "safe until": [_until(change) for change in changes],
+        "a run is": [change.check or "-" for change in changes],
     }
     if drawn is None:
         return columns
-    left = [each.squeal for each in changes]
-    beside = any(each.unstable_elsewhere for each in left if each)
-    columns["squeals"] = ["-" if each is None else percent(each.squeal_probability) for each in left]
+    squeals = [squeal.squeal for squeal in changes]
+    beside = any(squeal.unstable_elsewhere for squeal in squeals if squeal)
+    columns["squeals"] = ["-" if squeal is None else percent(squeal.squeal_probability) for squeal in squeals]
     if beside:
         columns["unstable else"] = [
-            "-" if each is None else percent(each.unstable_elsewhere or 0.0) for each in left
+            "-" if squeal is None else percent(squeal.unstable_elsewhere or 0.0) for squeal in squeals
         ]
     last = columns["unstable else" if beside else "squeals"]
-    last[:] = [f"{text}{_moved(each, drawn)}" for text, each in zip(last, left, strict=True)]
+    last[:] = [f"{text}{_moved(squeal, drawn)}" for text, squeal in zip(last, squeals, strict=True)]
     return columns
 
 
-def _moved(left: Left | None, drawn: Left) -> str:
+def _moved(remaining: Left | None, drawn: Left) -> str:
     """The frequency of what is left of squeal, where it differs from that of the drawing by more than 5 %."""
-    if left is None or not left.squeal_frequency or not drawn.squeal_frequency:
+    if remaining is None or not remaining.squeal_frequency or not drawn.squeal_frequency:
         return ""
-    far = abs(left.squeal_frequency / drawn.squeal_frequency - 1.0) > MOVED
-    return f", {left.squeal_frequency:.4g} Hz" if far else ""
+    far = abs(remaining.squeal_frequency / drawn.squeal_frequency - 1.0) > MOVED
+    return f", {remaining.squeal_frequency:.4g} Hz" if far else ""
 
 
 def _moves(report: AdviceReport) -> dict[str, list[str]]:
     """What moves the critical friction, and the growth; empty where nothing does."""
-    moving = [each for each in report.sensitivities if each.elasticity or each.derivative or each.growth_change]
+    moving = [key for key in report.sensitivities if key.elasticity or key.derivative or key.growth_change]
     if not moving:
         return {}
     return {
-        "what moves it": [each.parameter for each in moving],
-        "value": [text_of(each.value) if isinstance(each.value, float) else "list" for each in moving],
-        "% for 1 %": [text_of(each.elasticity, form=".3g") for each in moving],
-        "for a unit": [text_of(each.derivative, form=".3g") for each in moving],
-        "growth for 1 %": [text_of(each.growth_change, form=".3g") for each in moving],
+        "what moves it": [key.parameter for key in moving],
+        "value": [text_of(key.value) if isinstance(key.value, float) else "list" for key in moving],
+        "% for 1 %": [text_of(key.elasticity, form=".3g") for key in moving],
+        "for a unit": [text_of(key.derivative, form=".3g") for key in moving],
+        "growth for 1 %": [text_of(key.growth_change, form=".3g") for key in moving],
     }
 
 
@@ -272,16 +272,16 @@ def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer
     if numbers.get("output"):
         rows.append(Row("file", str(numbers["output"])))
     tables = []
-    for number, each in enumerate(numbers["branches"] or ()):
-        points = _off_flutter(each)
+    for number, branch in enumerate(numbers["branches"] or ()):
+        points = _off_flutter(branch)
         stable = sum(bool(point["stable"]) for point in points)
-        there = " beside the one at flutter" * (len(points) < len(each["points"]))
-        head = f"branch {number}: {each['kind']}, {len(points)} motions{there}, {stable} of them stable"
-        spans = zip(each.get("unstable_lower") or (), each.get("unstable_upper") or (), strict=True)
+        there = " beside the one at flutter" * (len(points) < len(branch["points"]))
+        head = f"branch {number}: {branch['kind']}, {len(points)} motions{there}, {stable} of them stable"
+        spans = zip(branch.get("unstable_lower") or (), branch.get("unstable_upper") or (), strict=True)
         parts = ", ".join(f"from {low:.4g} to {high:.4g}" for low, high in spans)
         head += f"; unstable {parts}" if parts else ""
-        note = f" ({each['note']})" if each["note"] else ""
-        tables.append(Table(_special_points(each["special"]), head + note))
+        note = f" ({branch['note']})" if branch["note"] else ""
+        tables.append(Table(_special_points(branch["special"]), head + note))
     return View(title, sentences([str(numbers["sentence"] or "")]), [*rows, *tables])
 
 
@@ -312,21 +312,21 @@ def of_scatter(numbers: Mapping[str, Any], title: str) -> View:
 
     failed = f", {numbers['failed']} without an answer" if numbers["failed"] else ""
     blocks: list[Row | Table] = [Row("samples", f"{numbers['samples']}{failed}")]
-    blocks += [Row("note", each) for each in numbers["notes"] or ()]
+    blocks += [Row("note", note) for note in numbers["notes"] or ()]
     if numbers.get("output"):
         blocks.append(Row("file", str(numbers["output"])))
     if numbers["quantiles"]:
-        units = {each.name: each.units for each in fields.SCATTERED}
+        units = {field.name: field.units for field in fields.SCATTERED}
         heads = [labelled(name.replace("_", " "), units.get(name, "")) for name in numbers["quantiles"]]
         columns = {"quantiles": heads}
-        for place, share in enumerate(SHARES):
-            columns[f"{share:.0%}"] = [f"{each[place]:.4g}" for each in numbers["quantiles"].values()]
+        for index, share in enumerate(SHARES):
+            columns[f"{share:.0%}"] = [f"{values[index]:.4g}" for values in numbers["quantiles"].values()]
         blocks.append(Table(columns))
     lower = numbers["probability_lower"]
     upper = numbers["probability_upper"]
     probabilities = {
         "a sample is": [fields.PROBABLE.get(name, name) for name in numbers["probability"]],
-        "probability": [f"{each:.2%}" for each in numbers["probability"].values()],
+        "probability": [f"{probability:.2%}" for probability in numbers["probability"].values()],
         "95 % interval": [f"{lower[name]:.2%} to {upper[name]:.2%}" for name in numbers["probability"]],
     }
     blocks.append(Table(probabilities, first=0))

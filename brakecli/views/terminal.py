@@ -15,13 +15,13 @@ def terminal_text(view: View, *, details: bool = False) -> str:
     parts = ["\n".join(filter(None, [heading(view.title), prose(" ".join(view.answer))]))]
     for kind, blocks in groupby(shown.blocks, type):
         if kind is Row:
-            rows = [each for each in blocks if isinstance(each, Row)]
-            parts.append(two_columns([(each.label, each.text) for each in rows]))
+            rows = [row for row in blocks if isinstance(row, Row)]
+            parts.append(two_columns([(row.label, row.text) for row in rows]))
         else:
-            for each in blocks:
-                if isinstance(each, Table):
-                    title = prose(f"{each.title}:") if each.title else ""
-                    parts.append("\n" + "\n".join(filter(None, [title, grid(each.columns, each.keys)])))
+            for table in blocks:
+                if isinstance(table, Table):
+                    title = prose(f"{table.title}:") if table.title else ""
+                    parts.append("\n" + "\n".join(filter(None, [title, grid(table.columns, table.keys)])))
     return "\n".join(filter(None, parts)).lstrip("\n")
 
 

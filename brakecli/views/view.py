@@ -41,7 +41,7 @@ class View:
 
     def short(self) -> "View":
         """The view without its details."""
-        return View(self.title, self.answer, [each for block in self.blocks for each in _short(block)])
+        return View(self.title, self.answer, [piece for block in self.blocks for piece in _short(block)])
 
 
 def _short(block: Row | Table) -> list[Row | Table]:
@@ -57,7 +57,7 @@ def _short(block: Row | Table) -> list[Row | Table]:
 
 def details(*rows: Row) -> list[Row]:
     """Rows that are shown on demand."""
-    return [Row(each.label, each.text, detail=True) for each in rows]
+    return [Row(row.label, row.text, detail=True) for row in rows]
 
 
 def sentence(text: str) -> str:
@@ -69,4 +69,4 @@ def sentence(text: str) -> str:
 
 def sentences(texts: Iterable[str]) -> list[str]:
     """Texts as sentences; an empty one is none."""
-    return [sentence(each) for each in texts if each]
+    return [sentence(text) for text in texts if text]

@@ -54,17 +54,17 @@ class Axis:
         steps = np.diff(self.values)
         return style.digits_of(style.largest(self.values), float(steps.min()) if len(steps) else 0.0)
 
-    def text(self, place: int) -> str:
+    def text(self, index: int) -> str:
         """The value at a place, with its unit."""
         factor, units = style.prefixed(style.largest(self.values), self.units)
-        number = style.readable(factor * float(self.values[place]), self.digits)
-        return f"{self.texts[place] if self.texts else number} {units}".rstrip()
+        number = style.readable(factor * float(self.values[index]), self.digits)
+        return f"{self.texts[index] if self.texts else number} {units}".rstrip()
 
-    def named(self, place: int) -> str:
+    def named(self, index: int) -> str:
         """The same with its key."""
-        return f"{self.key} = {self.text(place)}"
+        return f"{self.key} = {self.text(index)}"
 
-    def place(self, value: str) -> int | None:
+    def index_of(self, value: str) -> int | None:
         """Where the nearest value stands; None for a text that is not there, and for a number beyond all cells."""
         with suppress(ValueError):
             if self.texts is not None:

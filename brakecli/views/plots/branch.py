@@ -83,27 +83,27 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     )
     names = dict.fromkeys((above, "frequency"))
     branches = [_read(result, group, [*names]) for group in groups]
-    values = np.concatenate([np.zeros(0), *(each.columns["value"] for each in branches)])
+    values = np.concatenate([np.zeros(0), *(branch.columns["value"] for branch in branches)])
     if not len(values):
         raise UsageError(f"{result.path}: holds no motion, so there is nothing to draw")
-    known = result.variables(groups[0])
+    variables = result.variables(groups[0])
     attributes = result.attributes
     lines = str(attributes.get("title", "")), str(attributes.get("sentence", ""))
-    kinds = {str(kind) for each in branches for kind in each.marks["kind"]} & {*filter(_MARKERS.get, _MARKERS)}
+    kinds = {str(kind) for branch in branches for kind in branch.marks["kind"]} & {*filter(_MARKERS.get, _MARKERS)}
     in_row = _IN_ROW // 2 if style.is_narrow() else _IN_ROW
     rows = math.ceil((len(branches) + len(kinds) + len(_THRESHOLDS)) / in_row)
     figure = style.headed(_WIDTH, _HEIGHT + _ENTRY * rows, *lines, hspace=0.05)
     heights = [1.6, 1.0][: len(names)]
     panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
     for axes, name in zip(panels, names, strict=True):
-        _panel(axes, branches, name, style.unit_of(known[name].attributes))
+        _panel(axes, branches, name, style.unit_of(variables[name].attributes))
         for threshold, text, look in _THRESHOLDS:
             value = attributes.get(threshold)
             if isinstance(value, int | float) and math.isfinite(value):
                 label = f"{text} from {value:.4g} on"
                 axes.axvline(float(value), color=style.GREY, lw=1.1, ls=look, zorder=1.5, label=label)
     key = str(attributes.get("parameter", ""))
-    units = style.unit_of(known["value"].attributes)
+    units = style.unit_of(variables["value"].attributes)
     style.set_ticks(panels[-1].xaxis, float(values.min()), float(values.max()), units, key)
     figure.align_ylabels()
     for axes in panels:
@@ -115,8 +115,8 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
 
 def _read(result: StoredResult, group: str, names: list[str]) -> _Branch:
     """A branch; raises UsageError where its file is too old for one of these numbers."""
-    known = result.variables(group)
-    if lacking := [name for name in names if name not in known]:
+    variables = result.variables(group)
+    if lacking := [name for name in names if name not in variables]:
         problem = f"its branches have no {lacking[0]}, which older versions did not compute"
         raise UsageError(f"{result.path}: {problem}; follow them again, with brakecli branch")
     inner = f"{group}/special"
@@ -129,8 +129,8 @@ def _read(result: StoredResult, group: str, names: list[str]) -> _Branch:
 
 def _panel(axes: Axes, branches: list[_Branch], name: str, unit: str) -> None:
     """One number of all motions."""
-    drawn = np.concatenate([each.columns[name] for each in branches])
-    sizes = np.concatenate([np.zeros(0), *(each.columns[name] for each in branches if not each.slides)])
+    drawn = np.concatenate([branch.columns[name] for branch in branches])
+    sizes = np.concatenate([np.zeros(0), *(branch.columns[name] for branch in branches if not branch.slides)])
     sizes = sizes[sizes > 0.0]
     floor = -np.inf
     if name.startswith("amplitude") and len(sizes) and sizes.max() > _WIDE * sizes.min():
@@ -144,7 +144,7 @@ def _panel(axes: Axes, branches: list[_Branch], name: str, unit: str) -> None:
         axes.plot([], [], color=colour, lw=1.8, label=label)
         _line(axes, {**branch.columns, name: np.maximum(branch.columns[name], floor)}, name, colour)
         _marks(axes, branch.marks, name, colour, floor)
-    if not all(each.columns["stable"].all() for each in branches):
+    if not all(branch.columns["stable"].all() for branch in branches):
         axes.plot([], [], color=style.GREY, lw=1.2, ls=style.DASHES, label="unstable")
     style.set_ticks(axes.yaxis, max(floor, 0.0), style.largest(drawn), unit, _QUANTITIES[name])
 
@@ -158,21 +158,21 @@ def _with_ends(columns: dict[str, Any], marks: dict[str, Any]) -> dict[str, Any]
     """A branch with the special points between its motions at which it gains or loses its stability."""
     values = columns["value"]
     at = np.asarray(marks["value"], float)
-    for place in np.flatnonzero(np.diff(columns["stable"]))[::-1].tolist():
-        low, high = sorted(values[place : place + 2].tolist())
+    for index in np.flatnonzero(np.diff(columns["stable"]))[::-1].tolist():
+        low, high = sorted(values[index : index + 2].tolist())
         for mark in np.flatnonzero((low < at) & (at < high))[:1].tolist():
-            middle = {name: float(each[place : place + 2].mean()) for name, each in columns.items()}
+            middle = {name: float(column[index : index + 2].mean()) for name, column in columns.items()}
             there = {name: float(marks[name][mark]) if name in marks else middle[name] for name in columns}
             there["stable"] = 1.0
-            columns = {name: np.insert(each, place + 1, there[name]) for name, each in columns.items()}
+            columns = {name: np.insert(column, index + 1, there[name]) for name, column in columns.items()}
     return columns
 
 
 def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str) -> None:
     """One quantity of a branch: full between stable motions, dashed elsewhere."""
     stable = columns["stable"].astype(bool)
-    for full, part in groupby(range(len(stable) - 1), lambda place: bool(stable[place : place + 2].all())):
-        inside = [*part]
+    for full, stretch in groupby(range(len(stable) - 1), lambda index: bool(stable[index : index + 2].all())):
+        inside = [*stretch]
         inside.append(inside[-1] + 1)
         look: dict[str, Any] = {"ls": "-", "lw": 1.8} if full else {"ls": style.DASHES, "lw": 1.2}
         axes.plot(columns["value"][inside], columns[name][inside], color=colour, **look)
@@ -183,14 +183,14 @@ def _thin_marks(axes: Axes) -> None:
     axes.get_xlim(), axes.get_ylim()  # so that they are those of all that is drawn
     figure = axes.get_figure(root=True)
     apart = _APART * _SIZE / 72.0 * figure.get_dpi() if figure else 0.0
-    kept = list[tuple[object, float, float]]()
-    for line in [each for each in axes.get_lines() if each.get_marker() not in ("None", "")]:
+    drawn = list[tuple[object, float, float]]()
+    for line in [marker for marker in axes.get_lines() if marker.get_marker() not in ("None", "")]:
         ((x, y),) = axes.transData.transform(line.get_xydata())
         kind = line.get_label(), line.get_color()
-        if any(kind == other and math.hypot(x - a, y - b) < apart for other, a, b in kept):
+        if any(kind == other and math.hypot(x - a, y - b) < apart for other, a, b in drawn):
             line.remove()
         else:
-            kept.append((kind, x, y))
+            drawn.append((kind, x, y))
 
 
 def _marks(axes: Axes, marks: dict[str, Any], name: str, colour: str, floor: float) -> None:

@@ -43,14 +43,14 @@ def draw(result: StoredResult) -> Figure:
     drawn = (columns["error"] > 0.0) & (columns["error"] <= LARGEST)
     errors = columns["error"]
     columns["error"] = np.where(drawn, columns["error"], np.nan)
-    asked = _asked(columns, result)
-    named = _named(columns, best, target, asked)
+    of_case = _method_of_case(columns, result)
+    named = _named(columns, best, target, of_case)
     rows = _PANELS if np.isfinite(columns["wall_seconds"]).any() else _PANELS[1:]
     figure = style.headed(12.4, 6.6, heading, *lines, columns=len(rows), wspace=0.04)
     panels = style.panels(figure, 1, len(rows), sharey=True)[0]
     for axes, (name, factor, title, label) in zip(panels, rows, strict=True):
         work = np.where(drawn & (columns[name] > 0.0), factor * columns[name], np.nan)
-        _draw_errors(axes, columns, work, named, asked)
+        _draw_errors(axes, columns, work, named, of_case)
         if target > 0.0:
             axes.axhline(
                 target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=f"target {target:g}"
@@ -62,10 +62,10 @@ def draw(result: StoredResult) -> Figure:
         axes.set(title=title, xlabel=label)
         if not style.is_narrow():
             axes.label_outer()
-        left, right = axes.get_xlim()
-        axes.xaxis.set_major_locator(style.log_locator(right / left))
+        lowest, highest = axes.get_xlim()
+        axes.xaxis.set_major_locator(style.log_locator(highest / lowest))
         axes.xaxis.set_minor_formatter(NullFormatter())
-        if right / left < style.WIDE:
+        if highest / lowest < style.WIDE:
             axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
     panels[0].set_ylabel("largest relative error of x, y, ẋ, ẏ")
     if drawn.any():
@@ -75,11 +75,11 @@ def draw(result: StoredResult) -> Figure:
         for axes in panels if floor > low else ():
             band: dict[str, Any] = {"color": style.GREY, "alpha": 0.2, "lw": 0, "zorder": 0.5}
             axes.axhspan(low, floor, label="within the reference's error", **band)
-    found = style.labels(figure.axes)
-    found = {**{name: artist for name, artist in found.items() if name != _OTHERS}, **found}
+    artists = style.labels(figure.axes)
+    artists = {**{name: artist for name, artist in artists.items() if name != _OTHERS}, **artists}
     look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
     look["loc"] = "outside lower left" if style.is_narrow() else "outside right center"
-    figure.legend(found.values(), found.keys(), **look)
+    figure.legend(artists.values(), artists.keys(), **look)
     return figure
 
 
@@ -100,7 +100,7 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
     return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts.items() if count])
 
 
-def _named(columns: Columns, best: int | None, target: float, asked: str) -> list[str]:
+def _named(columns: Columns, best: int | None, target: float, of_case: str) -> list[str]:
     """The methods that have a name in the picture: what the case asks for, what is recommended, and the front.
 
     Of the front those that meet the target, or all where none does.
@@ -110,19 +110,19 @@ def _named(columns: Columns, best: int | None, target: float, asked: str) -> lis
     good = front & (columns["error"] <= target)
     best_of_all = [] if best is None else [methods[best]]
     named = [*best_of_all, *methods[good if good.any() else front].tolist()]
-    return [*dict.fromkeys([*([asked] if asked else []), *named])]
+    return [*dict.fromkeys([*([of_case] if of_case else []), *named])]
 
 
-def _asked(columns: Columns, result: StoredResult) -> str:
+def _method_of_case(columns: Columns, result: StoredResult) -> str:
     """The method that the case itself asks for, on the usual contact; empty where it is none of them."""
     solver = case_of(result).case.solver
     theta = ", ".join(f"{weight:.6g}" for weight in solver.theta or ())
-    asked = {"scheme": solver.scheme, "theta": theta, "start": solver.start, "iteration": solver.iteration}
-    same = np.all([columns[name] == value for name, value in asked.items()], axis=0)
+    settings = {"scheme": solver.scheme, "theta": theta, "start": solver.start, "iteration": solver.iteration}
+    same = np.all([columns[name] == value for name, value in settings.items()], axis=0)
     return str(columns["method"][same][0]) if same.any() else ""
 
 
-def _draw_errors(axes: Axes, columns: Columns, work: style.Array, named: list[str], asked: str) -> None:
+def _draw_errors(axes: Axes, columns: Columns, work: style.Array, named: list[str], of_case: str) -> None:
     """The error of every method over its work, in the order of the file; those without a name are grey."""
     axes.set(xscale="log", yscale="log")
     for method in dict.fromkeys(columns["method"].tolist()):
@@ -133,7 +133,7 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array, named: list[st
         if method in named:
             number = named.index(method)
             colour = _COLOURS[number % len(_COLOURS)]
-            label = f"{method}, of the case" if method == asked else method
+            label = f"{method}, of the case" if method == of_case else method
             look = {
                 "color": colour,
                 "marker": _MARKERS[number % len(_MARKERS)],

@@ -52,8 +52,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     axes.plot(x, eigenvalue, color=style.DARK, lw=1.1, label="by eigenvalues", marker=marker, ms=ms, ls=ls)
     regained = picture["critical_status"][0] == Outcome.REGAINED
     if critical.method == "simulation":
-        found = "by simulation" if _simulated(picture) else "critical value"
-        for chosen, face, label in ((~regained, style.BLUE, found), (regained, "white", "stable above")):
+        label_of_value = "by simulation" if _simulated(picture) else "critical value"
+        for chosen, face, label in ((~regained, style.BLUE, label_of_value), (regained, "white", "stable above")):
             if (there := chosen & np.isfinite(value)).any():
                 axes.plot(x[there], value[there], "o", color=style.BLUE, mfc=face, ms=size, label=label)
     elif regained.any():
@@ -135,12 +135,12 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
             if (chosen & (~died | bool(picture.attractors))).any() and order < sweep.MOST_NAMED:  # for the legend
                 axes.plot([], [], marker="s" if direction else marker, ms=7, label=label, **points)
         waves = np.where(shaken[number], y, factor * forced[number])
-        if (seen := np.isfinite(waves)).any():
-            axes.plot(x[seen], waves[seen], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
+        if (drawn := np.isfinite(waves)).any():
+            axes.plot(x[drawn], waves[drawn], "o", color=style.DARK, ms=0.4 * size, mec="white", mew=0.5)
     if shaken.any() or np.isfinite(forced).any():
         axes.plot([], [], "o", ms=3, color=style.DARK, label=sweep.FORCED)
-    for place in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
-        span = axis.edges[place : place + 2]
+    for index in np.flatnonzero(picture["hysteresis"][0]):  # `style.labels` names the first alone
+        span = axis.edges[index : index + 2]
         axes.axvspan(*span, color=style.GREEN, alpha=0.16, lw=0, zorder=0.5, label=sweep.DIFFERENT)
     margin = picture.variables.get(sweep.MARGIN, np.zeros((1, 0)))[0]
     for crossing in _crossings(axis.values, margin):
@@ -162,16 +162,16 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         axes.set_ylim(-0.03 * (highest or 1.0), 1.08 * (highest or 1.0))
     _, nothing, colour, _ = next(picture.kinds)  # steady sliding is the first attractor
     nothing = nothing if picture.attractors else "damped: nothing lasts"
-    rest = sweep.sign(died, nothing, ".", colour, style.DARK)
-    _mark(axes, x, [sweep.sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed(), rest])
+    still = sweep.sign(died, nothing, ".", colour, style.DARK)
+    _mark(axes, x, [sweep.sign(small, "smaller than drawn", "v", style.DARK, "white"), picture.failed(), still])
 
 
 def _crossings(x: style.Array, margin: style.Array) -> Iterator[float]:
     """Where the margin in friction passes zero, between neighbours along a straight line."""
     passes = np.diff(np.sign(margin)) * np.isfinite(margin[:-1] + margin[1:])
-    for place in np.flatnonzero(passes):
-        low, high = margin[place : place + 2]
-        yield float(x[place] - low * (x[place + 1] - x[place]) / (high - low))
+    for index in np.flatnonzero(passes):
+        low, high = margin[index : index + 2]
+        yield float(x[index] - low * (x[index + 1] - x[index]) / (high - low))
 
 
 def _mark(axes: Axes, x: style.Array, signs: Iterable[Sign]) -> None:
@@ -198,11 +198,11 @@ def _bars(axes: Axes, x: style.Array, value: style.Array, error: style.Array, si
     """Error bars that reach beyond dots of a size (1/72 inch); how large others are, the legend says."""
     low, high = axes.get_ylim()
     height = 72.0 * axes.get_window_extent().height / axes.figure.dpi
-    seen = error * height > 0.5 * size * (high - low)
+    visible = error * height > 0.5 * size * (high - low)
     look: dict[str, Any] = {"fmt": "none", "ecolor": style.BLUE, "capsize": 0.6 * size, "elinewidth": 1.0}
-    if seen.any():
-        axes.errorbar(x[seen], value[seen], error[seen], label="error bar", **look)
-    if hidden := style.largest(error[~seen & np.isfinite(value)]):
+    if visible.any():
+        axes.errorbar(x[visible], value[visible], error[visible], label="error bar", **look)
+    if hidden := style.largest(error[~visible & np.isfinite(value)]):
         axes.plot(
             [], [], "|", color=style.BLUE, label=f"errors up to {style.readable(hidden, 2)} lie within the dots"
         )

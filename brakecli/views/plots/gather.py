@@ -42,12 +42,12 @@ def gather(
         sweep = parse_table(Sweep, str(result.attributes.get("resolved_sweep_toml", "")), "its resolved sweep")
     except CaseError as error:
         raise style.unreadable(result, f"the sweep in it is not valid: {error.problems[0]}") from error
-    known = result.variables("/")
+    stored = result.variables("/")
     variables = _variables(result, sweep, shown, more)
-    dims = known["status"].dims
+    dims = stored["status"].dims
     both = dims[:1] == ("direction",)
-    units = {name: style.unit_of(each.attributes) for name, each in known.items()}
-    long_names = {name: str(each.attributes.get("long_name", "")) for name, each in known.items()}
+    units = {name: style.unit_of(variable.attributes) for name, variable in stored.items()}
+    long_names = {name: str(variable.attributes.get("long_name", "")) for name, variable in stored.items()}
     listed = _listed(result)
     axes = []
     # a list over a single key is a sweep along this key
@@ -67,7 +67,7 @@ def gather(
     )
     if more_keys := ", ".join(axis.key for axis, _ in listed[2:]):
         picture = replace(picture, chosen=(f"at different {more_keys}",))
-    if ATTRACTOR in known:
+    if ATTRACTOR in stored:
         picture = replace(picture, attractors=tuple(_attractors(variables)))
     for wanted in select:  # findings about the whole sweep need not hold for a part of it
         picture = replace(_selected(picture, wanted, result), findings=())
@@ -84,29 +84,29 @@ def _axis(result: StoredResult, name: str, values: style.Array) -> Axis:
     texts = tuple(values.tolist()) if values.dtype.kind == "U" else None
     places = (np.arange(len(values)) if texts else values).astype(np.float64)
     key = str(about.get("long_name", ""))
-    state = {f"initial.{each}" for each in ("x", "y", "vx", "vy")}
+    state = {f"initial.{component}" for component in ("x", "y", "vx", "vy")}
     offset = {*key.split(", ")} <= state and case_of(result).case.initial.at == "equilibrium"
     return Axis(name, key, style.unit_of(about), places, texts, offset)
 
 
 def _listed(result: StoredResult) -> tuple[tuple[Axis, style.Array], ...]:
     """An axis of each key of listed points that varies, and where along it each of them lies."""
-    found = []
-    known = result.variables("/")
+    listed = []
+    stored = result.variables("/")
     point = fields.LISTED_POINT.name
-    keys = np.ravel(known[point].attributes.get("parameters", ())) if point in known else ()
+    keys = np.ravel(stored[point].attributes.get("parameters", ())) if point in stored else ()
     for name in (str(key).replace(".", "_") for key in keys):
         values, places = np.unique(result.read("/", name), return_inverse=True)
         axis = _axis(result, name, values)
-        found += [(axis, axis.values[places])] * (len(values) > 1)
-    return tuple(found)
+        listed += [(axis, axis.values[places])] * (len(values) > 1)
+    return tuple(listed)
 
 
 def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[str]) -> dict[str, style.Array]:
     """What is drawn of the points, over the directions and the axes as they lie in the file."""
-    known = result.variables("/")
+    stored = result.variables("/")
     names = _NEEDED + (_CRITICAL if sweep.critical is not None else ())
-    dims = known["status"].dims
+    dims = stored["status"].dims
     both = dims[:1] == ("direction",)
 
     def read(name: str) -> style.Array:
@@ -115,7 +115,7 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
     variables = {name: read(name) for name in names}
     shape = variables["status"].shape
     for name in _WINDOWS if sweep.critical is not None else ():  # older results have none
-        there = name in known and known[name].dims == (*dims, fields.WINDOW.name)
+        there = name in stored and stored[name].dims == (*dims, fields.WINDOW.name)
         variables[name] = read(name) if there else np.full((*shape, 1), np.nan)
     if shown and shown not in (able := numeric(result)):
         problem = f"{argument('variable')} {shown}: no number of its points has this name"
@@ -126,13 +126,13 @@ def _variables(result: StoredResult, sweep: Sweep, shown: str, more: Sequence[st
         margin = margins(Plan(result.text("resolved_sweep_toml"), base)) if sweep.critical is None else None
     if margin is not None and margin.size == np.prod(shape[1:]):
         variables[MARGIN] = np.broadcast_to(margin.reshape(shape[1:]), shape)
-    for name in {shown, *more, *({FORCED_PART, ATTRACTOR} & {*known})} - {"", *variables}:
+    for name in {shown, *more, *({FORCED_PART, ATTRACTOR} & {*stored})} - {"", *variables}:
         values = read(name)
         nothing = np.nan if values.dtype.kind in "if" else ""
         variables[name] = np.where(variables["status"] == Status.DONE, values, nothing)
     for name in ("regime", "excitation"):  # those of points that failed mean nothing
         variables[name] = np.where(variables["status"] == Status.DONE, variables[name], "")
-    differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in known else False
+    differ = result.read("/", "hysteresis") == 1 if both and "hysteresis" in stored else False
     variables["hysteresis"] = np.broadcast_to(differ, shape)
     return variables
 
@@ -156,13 +156,14 @@ def _attractors(variables: Mapping[str, style.Array]) -> Iterator[str]:
 
 def numeric(result: StoredResult) -> list[str]:
     """The variables of a sweep that hold a number for each point."""
-    known = result.variables("/")
-    dims = known["status"].dims
-    return [name for name, each in known.items() if each.dims == dims and name not in dims and each.kind in "if"]
+    stored = result.variables("/")
+    dims = stored["status"].dims
+    of_points = {name: variable for name, variable in stored.items() if variable.dims == dims and name not in dims}
+    return [name for name, variable in of_points.items() if variable.kind in "if"]
 
 
 def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> SweepPicture:
-    key, _, value = (part.strip() for part in wanted.partition("="))
+    key, _, value = (text.strip() for text in wanted.partition("="))
     value = value.strip("\"'")
     both = len(picture.directions) > 1
     problem = "no axis has this key or value"
@@ -173,9 +174,9 @@ def _selected(picture: SweepPicture, wanted: str, result: StoredResult) -> Sweep
         choices = [*picture.directions]
     for number, axis in enumerate(picture.axes):
         if key in (axis.dimension, *axis.key.split(", ")):
-            if (place := axis.place(value)) is not None:
-                picture = picture.at(number, place)
-                same = axis.texts or style.readable(float(axis.values[place])) == style.readable(float(value))
+            if (index := axis.index_of(value)) is not None:
+                picture = picture.at(number, index)
+                same = axis.texts or style.readable(float(axis.values[index])) == style.readable(float(value))
                 note = "" if same else f" (nearest to {value})"
                 return replace(picture, chosen=(*picture.chosen[:-1], picture.chosen[-1] + note))
             problem = "no point has this value"

@@ -21,11 +21,11 @@ _LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the dashe
 
 def draw(result: StoredResult) -> Figure:
     """The figure: frequencies above, growth rates below. Raises UsageError where there is nothing to draw."""
-    place = result.variables("/")["frequencies"].dims[0]
-    attributes = result.variables("/")[place].attributes
+    dimension = result.variables("/")["frequencies"].dims[0]
+    attributes = result.variables("/")[dimension].attributes
     key = str(attributes.get("long_name", ""))
     units = style.unit_of(attributes)
-    x, *modes = (style.read_column(result, name) for name in (place, "frequencies", "growth_rates"))
+    x, *modes = (style.read_column(result, name) for name in (dimension, "frequencies", "growth_rates"))
     if not np.isfinite(modes[0]).any():
         raise UsageError(f"{result.path}: there is no steady sliding at any value, so there is nothing to draw")
     critical = np.asarray(result.attributes.get("critical_values", ()), float).ravel()

@@ -47,8 +47,8 @@ def draw(picture: SweepPicture) -> Figure:
     """The figure of a sweep over two axes, or over three: then a column of maps for each value of one of them."""
     critical = picture.critical is not None
     sliced = len(picture.axes) == 3
-    asked = picture.shown if picture.shown != sweep.ATTRACTOR else ""  # it has a map of its own
-    shown = asked or ("critical" if critical else "amplitude")
+    chosen = picture.shown if picture.shown != sweep.ATTRACTOR else ""  # it has a map of its own
+    shown = chosen or ("critical" if critical else "amplitude")
     scale = _amplitude_scale(picture) if shown == "amplitude" else _scale(picture, shown)
     draw_shown = _draw_critical if shown == "critical" else partial(_draw_numbers, name=shown)
     layers: dict[str, Callable[[Axes, SweepPicture, Scale], ScalarMappable]]
@@ -91,7 +91,7 @@ def slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
     lengths = [len(axis.values) for axis in picture.axes]
     short = [number for number in range(3) if lengths[number] <= sweep.MOST_PANELS]
     sliced = min(short, key=lambda number: (picture.axes[number].texts is None, lengths[number], -number))
-    pieces = [(picture.axes[sliced].named(place), picture.at(sliced, place)) for place in range(lengths[sliced])]
+    pieces = [(picture.axes[sliced].named(index), picture.at(sliced, index)) for index in range(lengths[sliced])]
     return [(name if len(name) < _LONG_TITLE else name.replace(" = ", "\n= "), piece) for name, piece in pieces]
 
 
@@ -186,15 +186,15 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     if picture.listed:
         return mesh
     values = scale.factor * picture["critical"][0]
-    known = np.isfinite(values)
-    areas = known[1:, 1:] & known[:-1, 1:] & known[1:, :-1] & known[:-1, :-1]
+    finite = np.isfinite(values)
+    areas = finite[1:, 1:] & finite[:-1, 1:] & finite[1:, :-1] & finite[:-1, :-1]
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
     if numeric and np.mean(areas) > _CONTOURED:
         _draw_contours(axes, picture, values, scale.norm)
         return mesh
     width = axes.get_window_extent().width / axes.figure.dpi
     if values.size <= _MOST_NUMBERS and width > _LEAST_CELL * len(values):
-        for i, j in np.argwhere(known):
+        for i, j in np.argwhere(finite):
             x = picture.axes[0].values[i]
             y = picture.axes[1].values[j]
             value = values[i, j]

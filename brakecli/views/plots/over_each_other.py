@@ -84,9 +84,9 @@ def _runs(results: Sequence[StoredResult], variable: str, names: Sequence[str], 
         _, frequency, density = picture.spectrum
         panels[2].semilogy(frequency[1:], scale * np.where(density > 0.0, density, np.nan)[1:], **curve)
     _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
-    parts = {picture.part for picture in pictures}
-    part = pictures[0].part if len(parts) == 1 else "Last part of each"
-    panels[0].set(title=f"{part}: {VARIABLES[variable][0]}", ylabel=look.label)
+    detail_names = {picture.detail_name for picture in pictures}
+    detail_name = pictures[0].detail_name if len(detail_names) == 1 else "Last part of each"
+    panels[0].set(title=f"{detail_name}: {VARIABLES[variable][0]}", ylabel=look.label)
     small = style.is_narrow() or in_a_row
     style.make_room(panels[0], 0.2 * len(results) if small else 0.2)
     panels[0].legend(loc="upper right", ncols=1 if small else len(results))
@@ -136,31 +136,31 @@ def _curves(
     results: Sequence[StoredResult], kind: str, variable: str, labels: Sequence[str], in_a_row: bool
 ) -> Figure:
     """Numbers along the one axis that all results have."""
-    known = results[0].variables("/")
+    variables = results[0].variables("/")
     critical = kind == "sweep" and all("critical" in result.variables("/") for result in results)
     names = (variable,) if variable else ("critical",) if critical else _SHOWN[kind]
     axis = _axis_of(results, names)
-    units = {name: style.unit_of(known[name].attributes) for name in (axis, *names)}
+    units = {name: style.unit_of(variables[name].attributes) for name in (axis, *names)}
     title = str(results[0].attributes.get("title", "")) or "Results beside each other"
-    told = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
+    summary = " and ".join(filter(None, (", ".join(labels[:-1]), labels[-1])))
     height = 2.8 if in_a_row else 2.2 + 2.3 / len(names)
-    figure, panels = _panels(len(names), height, title, [told], in_a_row)
+    figure, panels = _panels(len(names), height, title, [summary], in_a_row)
     places = [style.read_column(result, axis) for result in results]
     for axes, name in zip(panels, names, strict=True):
         columns = [style.read_column(result, name) for result in results]
-        for each, x, values, look in zip(labels, places, columns, _LOOKS, strict=False):
+        for label, x, values, look in zip(labels, places, columns, _LOOKS, strict=False):
             order = np.argsort(x, kind="stable")
             for number, line in enumerate(values[order].reshape(len(x), -1).T):
-                label = _plain(each) if number == 0 else None
+                legend = _plain(label) if number == 0 else None
                 marker = "o" if len(x) <= FEW else ""
-                axes.plot(x[order], line, marker=marker, ms=3.0 + look["lw"], label=label, **look)
+                axes.plot(x[order], line, marker=marker, ms=3.0 + look["lw"], label=legend, **look)
         drawn = np.concatenate([values.ravel() for values in columns])
         if name == "frequency" and np.isfinite(drawn).any():
             style.widen(axes, drawn)
         words = str(name).replace("_", " ")
         style.set_ticks(axes.yaxis, 0.0, max(map(style.largest, columns)), units[name], words)
     both = np.concatenate(places)
-    words = str(known[axis].attributes.get("long_name", axis))
+    words = str(variables[axis].attributes.get("long_name", axis))
     for axes in panels:
         style.set_ticks(axes.xaxis, float(both.min()), float(both.max()), units[axis], words)
         axes.label_outer()
@@ -171,16 +171,16 @@ def _curves(
 
 def _axis_of(results: Sequence[StoredResult], names: tuple[str, ...]) -> str:
     """The one axis of numbers along which all results have these numbers; raises UsageError without one."""
-    known = [result.variables("/") for result in results]
+    stored = [result.variables("/") for result in results]
     files = " and ".join(str(result.path) for result in results)
     for name in names:
-        dims = {each[name].dims if name in each else () for each in known}
+        dims = {variables[name].dims if name in variables else () for variables in stored}
         if () in dims or len(dims) > 1 or any(_is_text(result, name) for result in results):
             problem = f"{name} is not a number along the same axes in all of them"
             raise UsageError(
                 f"{files}: {problem}; name another {argument('variable')}, or leave {argument('output')} out"
             )
-    axes = [dim for dim in known[0][names[0]].dims if dim != "mode"]
+    axes = [dim for dim in stored[0][names[0]].dims if dim != "mode"]
     if len(axes) != 1 or any(_is_text(result, axes[0]) for result in results):
         remedy = f"draw each of them with brakecli plot, and leave {argument('output')} out"
         raise UsageError(f"{files}: only numbers along one axis of numbers are curves; {remedy}")

@@ -85,8 +85,8 @@ def draw(result: StoredResult, select: Sequence[str] = (), variable: str = "", s
         is_curve = len(picture.axes) == 1 and not picture.listed
         return curves.draw(picture) if is_curve else maps.draw(picture)
     if kind not in _KINDS:
-        known = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
-        raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {known}")
+        choices = "a run, of a sweep, of a comparison, of stability, of branches or of scatter"
+        raise UsageError(f"{result.path}: holds a result of kind {printable(kind)}; name the result of {choices}")
     if select:
         raise UsageError(
             f"{result.path}: {argument('select')} is for sweeps (found {select[0]!r}); leave it out for a {kind}"

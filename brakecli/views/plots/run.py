@@ -49,7 +49,7 @@ class RunPicture:
     """Everything that is drawn of a run, in SI units.
 
     `detail` holds the samples that are drawn one by one: time, x, state, belt (U), the variable, and what is drawn
-    against x, the `ordinate`; `part` names them.
+    against x, the `ordinate`; `detail_name` names them.
     """
 
     def __init__(self, result: StoredResult, variable: str = "vx") -> None:
@@ -75,7 +75,7 @@ class RunPicture:
         start, end = (float(read("time", i, i + 1)[0]) for i in (0, samples - 1))
         self.span = start, end  # s, of the whole run
         self.interval = (end - start) / (samples - 1) if samples > 1 else case.output.sample_interval
-        self.part, first, stop = _detail(result, samples, self.interval)
+        self.detail_name, first, stop = _detail(result, samples, self.interval)
         self.detail = {name: read(name, first, stop) for name in ("time", "state", *stored)}
         self.detail["belt"] = np.interp(self.detail["time"], times(system.belt), values(system.belt))
         wholes = {name: envelope(partial(read, name), samples) for name in {**stored, self.whole: ""}}
@@ -86,7 +86,7 @@ class RunPicture:
         self.near = self.ordinate == "vx" and (
             moving == 0.0 or fastest <= FLATTENS * moving
         )  # U does not flatten it
-        ends = {name: np.array(found[1:]) for name, found in wholes.items()}
+        ends = {name: np.array(bounds[1:]) for name, bounds in wholes.items()}
         self.axes = {
             name: scaled(name, self.detail[name], ends[name], speed * (name == "vx" and self.near))
             for name in stored
@@ -120,9 +120,9 @@ def _mode_frequencies(system: System) -> list[float]:
     if stability_work(system) + table_work(system) > MOST_WORK:
         return []
     c = system.coefficients
-    rest = sliding(system)
-    found = modes(c, rest.stiffness if rest else system.contact_stiffness, c.grip(system.belt_speed))
-    return sorted(mode.frequency for mode in found if mode.frequency > 0.0)
+    equilibrium = sliding(system)
+    both = modes(c, equilibrium.stiffness if equilibrium else system.contact_stiffness, c.grip(system.belt_speed))
+    return sorted(mode.frequency for mode in both if mode.frequency > 0.0)
 
 
 def envelope(read: Callable[[int, int], style.Array], samples: int, columns: int = COLUMNS) -> list[style.Array]:
@@ -162,9 +162,9 @@ def _detail(result: StoredResult, samples: int, interval: float) -> tuple[str, i
         moving = np.flatnonzero(result.read("history", "state", begin, begin + BLOCK) != ContactState.STICK)
         if moving.size:
             break
-    rest = (begin + int(moving[-1]) if moving.size else -1) + length // 8 + 2
-    if rest < samples:
-        return "Last motion, then stick", max(0, rest - length), rest
+    behind = (begin + int(moving[-1]) if moving.size else -1) + length // 8 + 2
+    if behind < samples:
+        return "Last motion, then stick", max(0, behind - length), behind
     return "End of the run" if length < samples else "Whole run", samples - length, samples
 
 
@@ -227,14 +227,14 @@ def _draw_detail(axes: Axes, picture: RunPicture) -> None:
     axes.plot(time, look_of(picture.detail[picture.variable]), color=style.BLUE, marker=_marker(time))
     look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
     for state, colour, label in _SHADES:
-        found = episodes(picture.detail["state"], state)
-        spans = [(time[first] - 0.5 * interval, (last - first + 1) * interval) for first, last in found]
+        stretches = episodes(picture.detail["state"], state)
+        spans = [(time[first] - 0.5 * interval, (last - first + 1) * interval) for first, last in stretches]
         if spans:
             axes.broken_barh(spans, (0, 1), color=colour, label=label, **look)
     if picture.near and picture.variable == "vx":
         label = f"U = {look_of.factor * belt[-1]:.4g} {look_of.unit}" if np.ptp(belt) == 0.0 else "U"
         axes.plot(time, look_of(belt), lw=1.1, label=label, **_BELT)
-    axes.set(title=f"{picture.part}: {VARIABLES[picture.variable][0]}", ylabel=look_of.label)
+    axes.set(title=f"{picture.detail_name}: {VARIABLES[picture.variable][0]}", ylabel=look_of.label)
     _limit(axes, look_of)
 
 
@@ -309,8 +309,8 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
         label = f"{len(picture.passing)} waves of the wheel pass"
         axes.plot(picture.passing, 0.0 * np.array(picture.passing), color=style.VERMILION, label=label, **ticks)
     if line:
-        known = f" ± {picture.resolution:.2g}" if picture.resolution and kind != "fundamental" else ""
-        label = f"{kind} {line:.4g}{known} Hz"
+        error = f" ± {picture.resolution:.2g}" if picture.resolution and kind != "fundamental" else ""
+        label = f"{kind} {line:.4g}{error} Hz"
         axes.axvline(line, color=style.GREEN, ls=style.DOTS, lw=1.4, zorder=0.9, label=label)
     turning = [mode for mode in picture.modes if mode <= right]
     texts = dict.fromkeys(f"{mode:.4g}" for mode in turning)

@@ -23,12 +23,12 @@ _OTHERS = style.BLUE
 
 def draw(result: StoredResult) -> Figure:
     """The figure: bars above, histograms below. Raises UnreadableResultError."""
-    known = result.variables("/")
+    variables = result.variables("/")
     shares = [
         style.read_column(result, name) for name in ("probability", "probability_lower", "probability_upper")
     ]
     outcomes = [*map(str, result.read("/", "outcome"))]
-    indexed = "total" in known and "parameter" in known
+    indexed = "total" in variables and "parameter" in variables
     columns = _columns(result)
     attributes = result.attributes
     rows = max(len(outcomes), 3)
@@ -44,7 +44,7 @@ def draw(result: StoredResult) -> Figure:
         shown = {"": values}
         if name == CRITICAL:
             shown = {"critical": values, "own": _own_friction(result)}
-        _histogram(axes, shown, name, style.unit_of(known[name].attributes), whose)
+        _histogram(axes, shown, name, style.unit_of(variables[name].attributes), whose)
     for axes in lower[len(columns) :]:
         axes.set_visible(False)
     return figure
@@ -52,23 +52,23 @@ def draw(result: StoredResult) -> Figure:
 
 def _columns(result: StoredResult) -> dict[str, tuple[style.Array, str]]:
     """The two numbers that are shown, and whose they are: critical friction, and how high it squeals or grows."""
-    found = dict[str, tuple[style.Array, str]]()
-    known = result.variables("/")
-    squeals = style.read_column(result, "squeal") == 1 if "squeal" in known else np.zeros(0, np.bool_)
+    columns = dict[str, tuple[style.Array, str]]()
+    variables = result.variables("/")
+    squeals = style.read_column(result, "squeal") == 1 if "squeal" in variables else np.zeros(0, np.bool_)
     for name in (CRITICAL, "frequency" if squeals.any() else "growth_rate", "amplitude"):
-        if name in known and len(found) < 2:
+        if name in variables and len(columns) < 2:
             values = style.read_column(result, name)
             only = name in ("frequency", "amplitude") and squeals.any()
             values = values[squeals] if only else values
             if np.isfinite(values).any():
-                found[name] = values[np.isfinite(values)], "samples that squeal" if only else "samples"
-    return found
+                columns[name] = values[np.isfinite(values)], "samples that squeal" if only else "samples"
+    return columns
 
 
 def _own_friction(result: StoredResult) -> style.Array:
     """The friction of the brakes themselves: of each sample, or of all where it does not scatter."""
-    for name, each in result.variables("/").items():
-        if "friction.coefficient" in str(each.attributes.get("long_name", "")).split(", "):
+    for name, variable in result.variables("/").items():
+        if "friction.coefficient" in str(variable.attributes.get("long_name", "")).split(", "):
             return style.read_column(result, name)
     return np.array([case_of(result).case.friction.coefficient])
 
@@ -82,7 +82,7 @@ def _probabilities(axes: Axes, names: list[str], value: style.Array, low: style.
     texts = [textwrap.fill(PROBABLE.get(name, name), _LONG) for name in names]
     axes.set_yticks(places, labels=texts, parse_math=False)
     axes.set_xlim(0.0, min(1.0, 1.1 * float(high.max())) or 1.0)
-    axes.xaxis.set_major_formatter(lambda each, _: f"{100.0 * each:.3g} %")
+    axes.xaxis.set_major_formatter(lambda share, _: f"{100.0 * share:.3g} %")
     axes.set_title("probability, with its 95 % interval")
     axes.grid(visible=False, axis="y")
 

@@ -45,8 +45,8 @@ def draw(result: StoredResult, section: str) -> Figure:
         points = _at_events(result, section, begin)
         where = f"at each {section}"
     else:
-        known = ", ".join((WAVE, *KINDS))
-        raise UsageError(f"{argument('section')} {section}: there is no such section; give one of {known}")
+        choices = ", ".join((WAVE, *KINDS))
+        raise UsageError(f"{argument('section')} {section}: there is no such section; give one of {choices}")
     last = {name: result.read("history", name, first) for name in _STATE}
     count = f"{len(points['x'])} points from {begin:.4g} s on"
     title = case_of(result).case.title or "Case without a title"
@@ -60,7 +60,7 @@ def draw(result: StoredResult, section: str) -> Figure:
         shown = points if near else last
         looks = [scaled(name, shown[name], np.r_[last[name], points[name]]) for name in pair]
         motion, dots = (
-            [look(found[name]) for name, look in zip(pair, looks, strict=True)] for found in (last, points)
+            [look(states[name]) for name, look in zip(pair, looks, strict=True)] for states in (last, points)
         )
         axes.plot(*motion, color=style.GREY, lw=0.4, alpha=0.6 if near else 1.0, label="motion", rasterized=True)
         axes.plot(*dots, color=style.BLUE, ls="none", marker=".", label="section")
@@ -103,14 +103,14 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
     parts = []
     for first in range(int(places[0]), int(places[-1]) + 1, BLOCK):
         there = times[(places >= first) & (places < first + BLOCK)]
-        part = (first, first + BLOCK + 1)
-        known, x, y, v_x, v_y = (result.read("history", name, *part) for name in ("time", *_STATE))
-        curves = [CubicHermiteSpline(known, *each) for each in ((x, v_x), (y, v_y))]
+        block = (first, first + BLOCK + 1)
+        t, x, y, v_x, v_y = (result.read("history", name, *block) for name in ("time", *_STATE))
+        curves = [CubicHermiteSpline(t, *motion) for motion in ((x, v_x), (y, v_y))]
         parts.append([curve(there, order) for order in (0, 1) for curve in curves])
-    found = {name: np.concatenate(each) for name, each in zip(_STATE, zip(*parts, strict=True), strict=True)}
+    points = {name: np.concatenate(pieces) for name, pieces in zip(_STATE, zip(*parts, strict=True), strict=True)}
     together = round((common_period(system) or 0.0) * frequency)
     repeat = f"; the waves repeat together every {together} dots" if together > 1 else ""
-    return found, f"at each wave of {frequency:.4g} Hz{repeat}"
+    return points, f"at each wave of {frequency:.4g} Hz{repeat}"
 
 
 def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
@@ -121,6 +121,6 @@ def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
     there = result.read("events", "time") >= begin
     kinds = result.read("events", "kind")[there]
     if kind not in kinds:
-        known = f"give one of {', '.join(sorted({*kinds.tolist()}))}" if len(kinds) else "run longer"
-        raise UsageError(f"{argument('section')} {kind}: {result.path} has none from {begin:.4g} s on; {known}")
+        choices = f"give one of {', '.join(sorted({*kinds.tolist()}))}" if len(kinds) else "run longer"
+        raise UsageError(f"{argument('section')} {kind}: {result.path} has none from {begin:.4g} s on; {choices}")
     return {name: result.read("events", name)[there][kinds == kind] for name in _STATE}

@@ -95,7 +95,7 @@ def _draw_velocity(axes: Axes, look: SignalLook) -> None:
     places = look.slips.places
     places = places[(places >= first) & (places < first + wanted)]
     reach = int(0.5 * gap) + 1  # in which a slip is fastest
-    places = np.array([place + int(np.argmax(np.abs(values[place : place + reach]))) for place in places], int)
+    places = np.array([start + int(np.argmax(np.abs(values[start : start + reach]))) for start in places], int)
     if len(places):
         there = step * (offset + places), factor * values[places]
         axes.plot(*there, ls="none", marker="v", color=style.VERMILION, label="events found")

@@ -56,8 +56,8 @@ def draw_spectrogram(axes: Axes, stop: Stop, modes: list[float]) -> None:
 def _highest(stop: Stop, modes: list[float]) -> float:
     """Up to where there is something to see: what is not too faint, and half as high again as both modes."""
     loud = (stop.density > stop.density.max(initial=0.0) * 10.0 ** (-0.1 * LOUD)).any(axis=0)
-    seen = float(stop.lines[loud][-1]) if loud.any() else 0.0
-    return min(max(1.2 * seen, 1.5 * max(modes, default=0.0), float(stop.lines[1])), float(stop.lines[-1]))
+    loudest = float(stop.lines[loud][-1]) if loud.any() else 0.0
+    return min(max(1.2 * loudest, 1.5 * max(modes, default=0.0), float(stop.lines[1])), float(stop.lines[-1]))
 
 
 def draw_amplitude(axes: Axes, stop: Stop) -> None:

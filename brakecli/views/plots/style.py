@@ -138,11 +138,11 @@ def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Array:
 
 def labels(panels: Iterable[Axes]) -> dict[str, Any]:
     """What panels label, each label once, with the artist that has it."""
-    found: dict[str, Any] = {}
+    artists: dict[str, Any] = {}
     for axes in panels:
         for artist, label in zip(*axes.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, artist)
-    return found
+            artists.setdefault(label, artist)
+    return artists
 
 
 def read_column(result: StoredResult, name: str, group: str = "/") -> Array:
@@ -233,18 +233,18 @@ def widen(axes: Axes, values: Array) -> None:
         axes.set_ylim(low - room, high + room)
 
 
-def make_room(axes: Axes, part: float = 0.14) -> None:
+def make_room(axes: Axes, fraction: float = 0.14) -> None:
     """Leave room for a legend above what is drawn."""
     low, high = axes.get_ylim()
-    axes.set_ylim(low, high + part * (high - low))
+    axes.set_ylim(low, high + fraction * (high - low))
 
 
 def keep_flat(axes: Axes, values: Array, scale: float = 0.0) -> None:
     """Draw values that differ by rounding, of numbers as large as they or `scale`, as a line in the middle."""
-    known = values[np.isfinite(values)]
-    size = max(largest(known), scale)
-    if known.size and float(np.ptp(known)) <= ROUNDING * size:
-        middle = float(np.median(known))
+    finite = values[np.isfinite(values)]
+    size = max(largest(finite), scale)
+    if finite.size and float(np.ptp(finite)) <= ROUNDING * size:
+        middle = float(np.median(finite))
         half = 0.05 * (size or 1.0)
         axes.set_ylim(middle - half, middle + half)
 
@@ -256,8 +256,8 @@ def thin_ticks(axis: XAxis | YAxis, figure: Figure) -> None:
         low, high = sorted(axis.get_view_interval())
         boxes = [
             tick.label1.get_window_extent().get_points()[:, side]
-            for place, tick in zip(places, axis.get_major_ticks(), strict=False)
-            if low <= place <= high and tick.label1.get_visible() and tick.label1.get_rotation() == 0.0
+            for position, tick in zip(places, axis.get_major_ticks(), strict=False)
+            if low <= position <= high and tick.label1.get_visible() and tick.label1.get_rotation() == 0.0
         ]
         gap = 4.0 if side == 0 else 0.0
         if all(after[0] - before[1] >= gap for before, after in pairwise(sorted(boxes, key=lambda box: box[0]))):

@@ -79,12 +79,12 @@ class SweepPicture:
         places = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
         return tuple(zip(self.axes, places, strict=True))
 
-    def named(self, place: Sequence[Any]) -> str:
+    def named(self, indices: Sequence[Any]) -> str:
         """The keys of a point with their values, by its place along each axis."""
         if self.listed:
-            at = [(axis, int(np.searchsorted(axis.values, along[place[0]]))) for axis, along in self.listed]
+            at = [(axis, int(np.searchsorted(axis.values, along[indices[0]]))) for axis, along in self.listed]
         else:
-            at = [*zip(self.axes, map(int, place), strict=True)]
+            at = [*zip(self.axes, map(int, indices), strict=True)]
         return ", ".join(axis.named(where) for axis, where in at)
 
     @property
@@ -108,23 +108,23 @@ class SweepPicture:
             regimes = zip(*np.unique(self["regime"][done], return_counts=True), strict=True)
             parts += [f"{name} {count}" for name, count in regimes]
         else:
-            known = self["critical"][np.isfinite(self["critical"])]
-            ends = [style.readable(float(f"{end(known):.4g}")) for end in (np.min, np.max) if known.size]
+            finite = self["critical"][np.isfinite(self["critical"])]
+            ends = [style.readable(float(f"{end(finite):.4g}")) for end in (np.min, np.max) if finite.size]
             span = f": {' to '.join(ends)} {self.units['critical']}".rstrip() if ends else ""
-            parts.append(f"critical value found at {known.size}{span}")
+            parts.append(f"critical value found at {finite.size}{span}")
         parts += [f"failed {(~done).sum()}"] if not done.all() else []
         return "   ·   ".join(parts)
 
-    def at(self, axis: int, place: int) -> "SweepPicture":
+    def at(self, axis: int, index: int) -> "SweepPicture":
         """What is left of the picture at one place of an axis."""
-        variables = {name: np.take(values, place, axis + 1) for name, values in self.variables.items()}
+        variables = {name: np.take(values, index, axis + 1) for name, values in self.variables.items()}
         axes = self.axes[:axis] + self.axes[axis + 1 :]
-        return replace(self, axes=axes, variables=variables, chosen=(*self.chosen, self.axes[axis].named(place)))
+        return replace(self, axes=axes, variables=variables, chosen=(*self.chosen, self.axes[axis].named(index)))
 
     def towards(self, direction: str) -> "SweepPicture":
         """The picture of one direction alone."""
-        place = [self.directions.index(direction)]
-        variables = {name: values[place] for name, values in self.variables.items()}
+        index = [self.directions.index(direction)]
+        variables = {name: values[index] for name, values in self.variables.items()}
         chosen = (*self.chosen, f"on the way {direction}")
         return replace(self, directions=(direction,), variables=variables, chosen=chosen)
 
@@ -203,9 +203,9 @@ def add_legend(figure: Figure) -> None:
             break
     engine = figure.get_layout_engine()
     assert isinstance(engine, ConstrainedLayoutEngine)
-    left, bottom, wide, high = engine.get()["rect"]
+    x, y, wide, high = engine.get()["rect"]
     look: dict[str, Any] = {"frameon": False, "borderaxespad": 0.0, "borderpad": 0.0, "columnspacing": 1.6}
-    look |= {"loc": "upper left", "bbox_to_anchor": (0.125 / width, bottom + high), "ncols": columns}
+    look |= {"loc": "upper left", "bbox_to_anchor": (0.125 / width, y + high), "ncols": columns}
     figure.legend([artists[text] for text in texts], texts, **look).set_in_layout(False)
     taken = (0.19 * -(-len(texts) // columns) + 0.09) / height
-    engine.set(rect=(left, bottom, wide, high - taken))
+    engine.set(rect=(x, y, wide, high - taken))

@@ -132,28 +132,28 @@ def _prefixed(value: Any, unit: str) -> str:
     return f"{style.readable(factor * float(value))} {unit}".rstrip().replace(" ", "\u00a0")
 
 
-PAGE = Renderer(_prefixed, "–", most=8, each=True)
+PAGE = Renderer(_prefixed, "–", most=8, units_each=True)
 """A page writes a prefix where a number needs one."""
 shown = PAGE.text
 
 
 def blocks_of(view: View) -> list[Any]:
     """The numbers and tables of a view, as a page writes them."""
-    found = list[Any]()
+    pieces = list[Any]()
     for kind, blocks in groupby(view.blocks, type):
         if kind is Row:
-            found.append(Table([(each.label, each.text) for each in blocks if isinstance(each, Row)]))
+            pieces.append(Table([(row.label, row.text) for row in blocks if isinstance(row, Row)]))
             continue
-        for each in blocks:
-            if isinstance(each, Columns):
-                found.append(Texts(sentences([each.title])))
-                found.append(Table([*zip(*each.columns.values(), strict=True)], [*each.columns]))
-    return found
+        for table in blocks:
+            if isinstance(table, Columns):
+                pieces.append(Texts(sentences([table.title])))
+                pieces.append(Table([*zip(*table.columns.values(), strict=True)], [*table.columns]))
+    return pieces
 
 
-def percent(part: float) -> str:
+def percent(fraction: float) -> str:
     """A change, as a part of what was there before, in per cent."""
-    return f"{100.0 * part:+.3g}\u00a0%".replace("-", "−")
+    return f"{100.0 * fraction:+.3g}\u00a0%".replace("-", "−")
 
 
 def rounded(value: Any, digits: int) -> Any:
@@ -168,16 +168,16 @@ def key_unit(key: str) -> str:
     return ""
 
 
-def numbers_of(known: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
+def numbers_of(fields: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
     """The values of some fields, None where there is none; parts are in per cent, as in sentences."""
-    return {each.title: _number(each, values.get(each.name)) for each in known}
+    return {item.title: _number(item, values.get(item.name)) for item in fields}
 
 
-def share(part: float | None) -> tuple[float | None, str]:
+def share(fraction: float | None) -> tuple[float | None, str]:
     """A part of a whole in per cent, with that as its unit."""
-    return None if part is None else 100.0 * part, PER_CENT
+    return None if fraction is None else 100.0 * fraction, PER_CENT
 
 
-def _number(each: Field, value: Any) -> tuple[Any, str]:
-    is_part = each.is_part_of_time or each.name in _PARTS
-    return share(value) if is_part else (value, each.units)
+def _number(item: Field, value: Any) -> tuple[Any, str]:
+    is_part = item.is_part_of_time or item.name in _PARTS
+    return share(value) if is_part else (value, item.units)

@@ -72,7 +72,7 @@ _ACCURACY = (
 
 def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
-    found = result.attributes
+    attributes = result.attributes
     loaded = case_of(result)
     advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_WORK), loaded.case)
     theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
@@ -81,36 +81,36 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     title = loaded.case.title or "Case without a title"
     of_theory = numbers_of(named(ADVICE, "critical_friction", "margin", "squeal_probability"), advice.numbers())
     growth = advice.stability.modes[0].growth if advice.stability.modes else None  # of small motions, by theory
-    known = {
+    values = {
         **above_rounding(stored_numbers(result)),
-        "growth_rate": growth if found.get("growth_rate") is None else found["growth_rate"],
+        "growth_rate": growth if attributes.get("growth_rate") is None else attributes["growth_rate"],
     }
-    numbers = {**of_theory, **numbers_of(named(fields.VERDICT, *_MAIN), known)}
+    numbers = {**of_theory, **numbers_of(named(fields.VERDICT, *_MAIN), values)}
     drawn = picture(PICTURE, partial(draw, result))
-    change = [*_to_change(advice, found.get("regime"))]
+    change = [*_to_change(advice, attributes.get("regime"))]
     sections = partial(_appendix, result, loaded, advice)
     return Part(name, title, QUESTION, answer, drawn, change, sections, numbers, result.versions, advice)
 
 
 def _appendix(result: StoredResult, loaded: LoadedCase, advice: AdviceReport) -> list[Section]:
     """What the first page leaves out."""
-    found = result.attributes
+    attributes = result.attributes
     again = f"brakecli run {escaped(shlex.quote(result.path.name))} -o again.h5"
-    left_out = sentences(f"Left out: {each}" for each in found.get("left_out", ()))
-    notes = Texts([*sentences(found.get("adjustments", ())), *left_out])
+    left_out = sentences(f"Left out: {name}" for name in attributes.get("left_out", ()))
+    notes = Texts([*sentences(attributes.get("adjustments", ())), *left_out])
     return [
         Section("Case", case_blocks(loaded)),
         Section("Stability of steady sliding", [*_stability(advice)]),
         Section("Regime, and its evidence", _regime(result)),
         Section("Accuracy", [*_accuracy(result), notes]),
-        Section("Warnings", [Texts(sentences(found.get("warnings", ())) or ["There are none."])]),
+        Section("Warnings", [Texts(sentences(attributes.get("warnings", ())) or ["There are none."])]),
         Section("How to repeat it", repeat(result, again, result.text("case_toml"))),
     ]
 
 
 def _to_change(advice: AdviceReport, regime: Any) -> Iterator[Any]:
     """The changes that help most, and what the advice rests on."""
-    helpful = [each for each in advice.advice if each.to is not None]
+    helpful = [change for change in advice.advice if change.to is not None]
     lines = []
     if helpful:
         yield _changes(helpful[:MOST_CHANGES], advice.wanted_margin)
@@ -128,12 +128,12 @@ def _to_change(advice: AdviceReport, regime: Any) -> Iterator[Any]:
 def _changes(changes: Iterable[Change], margin: float) -> Table:
     rows = [
         (
-            each.parameter,
-            shown(each.start, unit(each.parameter)),
-            "no help" if each.to is None else _target(each),
-            shown(each.critical_friction and float(f"{each.critical_friction:.4g}")),
+            change.parameter,
+            shown(change.start, unit(change.parameter)),
+            "no help" if change.to is None else _target(change),
+            shown(change.critical_friction and float(f"{change.critical_friction:.4g}")),
         )
-        for each in changes
+        for change in changes
     ]
     return Table(rows, ("what to change", "from", f"to, for a margin of {margin:.0%}", "critical friction then"))
 
@@ -141,8 +141,8 @@ def _changes(changes: Iterable[Change], margin: float) -> Table:
 def _target(change: Change) -> str:
     """The value that a change leads to, with what that is in per cent of the present one."""
     value = float(change.rounded)
-    part = f" ({percent(value / change.start - 1.0)})" if change.start else ""
-    return shown(value, unit(change.parameter)) + part
+    relative = f" ({percent(value / change.start - 1.0)})" if change.start else ""
+    return shown(value, unit(change.parameter)) + relative
 
 
 def case_blocks(loaded: LoadedCase) -> list[Any]:
@@ -156,17 +156,17 @@ def case_blocks(loaded: LoadedCase) -> list[Any]:
     return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
 
 
-def repeat(result: StoredResult, again: str, given: str) -> list[Any]:
+def repeat(result: StoredResult, again: str, source: str) -> list[Any]:
     """The commands that give the result, and this page, again; and the file that it was computed from."""
     report = f"brakecli report {escaped(shlex.quote(result.path.name))} --full -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
-    return [Code(f"{again}\n{report}"), Texts([exactly]), Code(given, "The file as it was given")]
+    return [Code(f"{again}\n{report}"), Texts([exactly]), Code(source, "The file as it was given")]
 
 
 def _stability(advice: AdviceReport) -> Iterator[Any]:
     report = advice.stability
-    known = values_of(STABILITY, report) | values_of(THRESHOLDS, advice.thresholds)
-    view = of_stability(known, "", PAGE)
+    numbers = values_of(STABILITY, report) | values_of(THRESHOLDS, advice.thresholds)
+    view = of_stability(numbers, "", PAGE)
     yield Texts(view.answer)
     yield from blocks_of(view)
     if report.equilibrium is not None and report.belt_speed:
@@ -174,7 +174,7 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
             "Lock-in diagram: frequencies and growth rates of both modes over the friction coefficient",
             partial(_diagram, advice),
         )
-    tables = [each for each in of_advice(advice, PAGE).blocks if isinstance(each, Columns)]
+    tables = [block for block in of_advice(advice, PAGE).blocks if isinstance(block, Columns)]
     yield from blocks_of(View("", blocks=tables))
 
 
@@ -194,9 +194,9 @@ def _diagram(advice: AdviceReport) -> Figure:
 
     pairs = followed(map(at, phi.tolist()))
     none = [(np.nan, np.nan)] * 2
-    found = np.array([[(mode.frequency, mode.growth) for mode in pair] if pair else none for pair in pairs])
-    ends = np.array([each.friction for each in report.crossings if each.friction <= highest])
-    figure = lock_in.diagram("", "friction coefficient φ", "", phi, (found[..., 0], found[..., 1]), ends)
+    curves = np.array([[(mode.frequency, mode.growth) for mode in pair] if pair else none for pair in pairs])
+    ends = np.array([crossing.friction for crossing in report.crossings if crossing.friction <= highest])
+    figure = lock_in.diagram("", "friction coefficient φ", "", phi, (curves[..., 0], curves[..., 1]), ends)
     for axes in figure.axes:
         axes.axvline(report.friction, color=style.GREEN, lw=1.3, ls=style.DASHES, label="this case")
     figure.axes[0].legend(loc="best")
@@ -204,19 +204,20 @@ def _diagram(advice: AdviceReport) -> Figure:
 
 
 def _regime(result: StoredResult) -> list[Any]:
-    found = result.attributes
-    rows = PAGE.rows((each for each in fields.VERDICT if each.kind != fields.OBJECT), found)
+    attributes = result.attributes
+    rows = PAGE.rows((field for field in fields.VERDICT if field.kind != fields.OBJECT), attributes)
     evidence = result.group_attributes("regime/evidence")
     proof = [
         (name.replace("_", " "), shown(value, fields.evidence_unit(name)))
         for name, value in sorted(evidence.items())
     ]
-    reasons = Texts(sentences(reasons_of(found, PAGE)))
+    reasons = Texts(sentences(reasons_of(attributes, PAGE)))
     intervals = stored_numbers(result).get("vibrations") or []
     vibrations = [
-        [shown(rounded(each[field.name], DIGITS), field.units) for field in fields.VIBRATION] for each in intervals
+        [shown(rounded(interval[field.name], DIGITS), field.units) for field in fields.VIBRATION]
+        for interval in intervals
     ]
-    beats = [Table(vibrations, [each.meaning for each in fields.VIBRATION])]
+    beats = [Table(vibrations, [field.meaning for field in fields.VIBRATION])]
     shown_on_demand = Table(proof, ("evidence", "value"), "All numbers by which the table decided")
     return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
 

@@ -52,29 +52,29 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
     """
     if len({str(result.attributes.get("kind")) for result in results}) != 1:
         return None
-    given = [keys(result, ("case_toml",)) for result in results]
-    fixed = [name for name in _CHOSEN if any(isinstance(each.get(name), int | float) for each in given)]
+    sources = [keys(result, ("case_toml",)) for result in results]
+    fixed = [name for name in _CHOSEN if any(isinstance(source.get(name), int | float) for source in sources)]
     case = list[tuple[Any, ...]]()
     chosen = list[str]()
     every = [keys(result) for result in results]
-    for name in dict.fromkeys(name for each in every for name in each):
-        values = [each.get(name) for each in every]
+    for name in dict.fromkeys(name for case_keys in every for name in case_keys):
+        values = [case_keys.get(name) for case_keys in every]
         if all(value == values[0] for value in values):
             continue
         texts = [shown(value, key_unit(name)) for value in values]
         if name in _CHOSEN and name not in fixed:
             chosen += [f"{name} ({', '.join(texts)})"] * (len({*texts}) > 1)
         elif name != "title" and {} not in values:  # which stands for a table without keys
-            told, units = _with_its_key(name, every)
-            case.append((told, *values, units))
-    known = {name: units for part in parts for name, (_, units) in part.numbers.items()}
+            label, units = _with_its_key(name, every)
+            case.append((label, *values, units))
+    units_of = {name: units for part in parts for name, (_, units) in part.numbers.items()}
     numbers = []
-    for name, units in known.items():
+    for name, units in units_of.items():
         values = [rounded(part.numbers.get(name, (None,))[0], DIGITS) for part in parts]
         if {*map(str, values)} - {"None", ""}:
             numbers.append((name, *values, units))
-    single = [row for row in case if all(isinstance(each, str | int | float) for each in row[1:-1])][:_NAMED]
-    apart = [_told(single, side) for side in range(1, len(parts) + 1)]
+    single = [row for row in case if all(isinstance(value, str | int | float) for value in row[1:-1])][:_NAMED]
+    apart = [_changes(single, side) for side in range(1, len(parts) + 1)]
     names = [", ".join(filter(None, pair)) for pair in zip((part.name for part in parts), apart, strict=True)]
     letters = "ABC"[: len(parts)]
     files = [f"{letter}: {part.name}" for letter, part in zip(letters, parts, strict=True)]
@@ -82,11 +82,11 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         draw = partial(over_each_other.draw, results, "", files, in_a_row=len(parts) > _NARROW)
         pictures = [picture(PICTURE + THIRD * (len(parts) > _NARROW), draw)]
     except UsageError:  # no curves that could be drawn over each other
-        pictures = [each.picture for each in parts if each.picture]
+        pictures = [part.picture for part in parts if part.picture]
     titles = [part.title for part in parts]
     title = " – ".join(titles)
     if len({*titles}) == 1:
-        steps = [f"{name} {' → '.join(shown(each, units) for each in values)}" for name, *values, units in single]
+        steps = [f"{name} {' → '.join(shown(v, units) for v in values)}" for name, *values, units in single]
         title = f"{titles[0]}: {', '.join(steps) or ' – '.join(names)}"
         titles = [", ".join(filter(None, pair)) for pair in zip(files, apart, strict=True)]
     head = ("", *letters, *(f"{letter} against A" for letter in letters[1:]))
@@ -98,15 +98,15 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         numbers = [row for row in numbers if len({*map(str, row[1:-1])}) > 1][:_MOST_NUMBERS]
     if chosen:
         blocks.append(Texts([f"Not given as numbers in the files, and different, too: {', '.join(chosen)}."]))
-    advice = [each.advice for each in parts if each.advice]
+    advice = [part.advice for part in parts if part.advice]
     best = best_of(dict(zip(letters, advice, strict=True))) if len(advice) == len(parts) else ""
-    squeal = [each.squeal for each in parts if each.squeal]
+    squeal = [part.squeal for part in parts if part.squeal]
     if len(squeal) == len(parts):
         best = seldom_of(dict(zip(letters, squeal, strict=True)))
     return Beside(title, best, names, titles, blocks, _table(numbers, head), pictures)
 
 
-def _told(rows: Sequence[tuple[Any, ...]], side: int) -> str:
+def _changes(rows: Sequence[tuple[Any, ...]], side: int) -> str:
     """The changed keys of one result with their values; both ends of a range together."""
     said = list[str]()
     for row, after in zip(rows, [*rows, ("",)][1:], strict=True):
@@ -123,7 +123,8 @@ def _told(rows: Sequence[tuple[Any, ...]], side: int) -> str:
 def _with_its_key(name: str, every: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
     """A key of a sweep or a study by the key of the case that it is about, if that is the same, and its unit."""
     table, _, what = name.rpartition(".")
-    about = [next((each[f"{table}.{key}"] for key in _ABOUT if f"{table}.{key}" in each), "") for each in every]
+    places = [f"{table}.{key}" for key in _ABOUT]
+    about = [next((case_keys[name] for name in places if name in case_keys), "") for case_keys in every]
     one = about[0]
     if "[" not in table or what in _ABOUT or not isinstance(one, str) or not one or about.count(one) < len(about):
         return name, key_unit(name)
@@ -137,19 +138,20 @@ def best_of(designs: Mapping[str, AdviceReport]) -> str:
     are told apart by their first digits, as numbers of a page are, and shares where their 95 % intervals do not
     meet.
     """
-    if any(each.stability.equilibrium is None or not each.stability.belt_speed for each in designs.values()):
+    if any(advice.stability.equilibrium is None or not advice.stability.belt_speed for advice in designs.values()):
         return ""
-    times = {name: _times(each) for name, each in designs.items()}
-    far = [name for name, each in times.items() if each == max(times.values())]
-    finite = [f"{each:.4g} for {name}" for name, each in times.items() if math.isfinite(each)]
+    times = {name: _times(advice) for name, advice in designs.items()}
+    far = [name for name, ratio in times.items() if ratio == max(times.values())]
+    finite = [f"{ratio:.4g} for {name}" for name, ratio in times.items() if math.isfinite(ratio)]
     by = [f"critical friction over own friction is {listed(finite)}"] if finite else []
-    by += [f"no friction makes {name} squeal" for name, each in times.items() if math.isinf(each)]
+    by += [f"no friction makes {name} squeal" for name, ratio in times.items() if math.isinf(ratio)]
     seldom = [*designs]
-    left = {name: each.squeal for name, each in designs.items() if each.squeal}
-    if len(left) == len(designs):
-        least = min(left.values(), key=lambda each: each.squeal_probability)
-        seldom = [name for name, each in left.items() if each.squeal_lower <= least.squeal_upper]
-        shares = listed([f"{100.0 * each.squeal_probability:.2g} % of {name}" for name, each in left.items()])
+    squeals = {name: advice.squeal for name, advice in designs.items() if advice.squeal}
+    if len(squeals) == len(designs):
+        least = min(squeals.values(), key=lambda squeal: squeal.squeal_probability)
+        seldom = [name for name, squeal in squeals.items() if squeal.squeal_lower <= least.squeal_upper]
+        per_cent = {name: 100.0 * squeal.squeal_probability for name, squeal in squeals.items()}
+        shares = listed([f"{probability:.2g} % of {name}" for name, probability in per_cent.items()])
         by.append(f"under a scatter {next(iter(designs.values())).scatter} {shares} squeal")
     both = [name for name in far if name in seldom]
     better, larger, fewer = ("better", "larger", "fewer") if len(designs) == 2 else ("best", "largest", "fewest")
@@ -164,14 +166,14 @@ def best_of(designs: Mapping[str, AdviceReport]) -> str:
 def seldom_of(squeal: Mapping[str, Shares]) -> str:
     """Of which designs fewest squeal; empty where the 95 % intervals of all meet that of the fewest."""
     least = min(squeal.values())
-    seldom = [name for name, each in squeal.items() if each[1] <= least[2]]
+    seldom = [name for name, (_, low, _) in squeal.items() if low <= least[2]]
     if len(seldom) == len(squeal):
         return ""
     better = "better" if len(squeal) == 2 else "best"
     said = f"{listed(seldom)} {'is' if len(seldom) == 1 else 'are'} {better} against squeal"
     shares = [
-        f"{100.0 * each:.3g} % ({100.0 * low:.3g} to {100.0 * high:.3g} %) of {name}"
-        for name, (each, low, high) in squeal.items()
+        f"{100.0 * middle:.3g} % ({100.0 * low:.3g} to {100.0 * high:.3g} %) of {name}"
+        for name, (middle, low, high) in squeal.items()
     ]
     return sentence(f"{said}: {listed(shares)} squeal")
 
@@ -183,14 +185,14 @@ def _times(advice: AdviceReport) -> float:
 
 def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:
     """Name, all values, and by how much they differ from the first, of rows that end with the unit."""
-    found = list[tuple[str, ...]]()
+    cells = list[tuple[str, ...]]()
     marked = list[int]()
     for name, first, *others, units in rows:
         changes = [_change(first, other, units) for other in others]
         if {*changes} != {_SAME}:
-            marked.append(len(found))
-        found.append((name, *(shown(each, units) for each in (first, *others)), *changes))
-    return Table(found, head, marked=marked)
+            marked.append(len(cells))
+        cells.append((name, *(shown(value, units) for value in (first, *others)), *changes))
+    return Table(cells, head, marked=marked)
 
 
 def _change(a: Any, b: Any, units: str) -> str:
@@ -200,7 +202,7 @@ def _change(a: Any, b: Any, units: str) -> str:
     """
     if a == b:
         return _SAME
-    if all(isinstance(each, int | float) and not isinstance(each, bool) for each in (a, b)):
+    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in (a, b)):
         if units == PER_CENT or min(a, b) < 0.0:
             more = rounded(float(b - a), _OF_CHANGE)
             sign = "+" if more > 0.0 else ""

@@ -78,30 +78,35 @@ _ADVISE["scatter"] = "brakecli advise CASE.toml --scatter STUDY.toml"
 
 def part_of_sweep(result: StoredResult) -> Part:
     """What the page says of a sweep. Raises UnreadableResultError."""
-    known = result.variables("/")
-    names = [*(name for name in _TEXTS if name in known), *(name for name in numeric(result) if name not in _IDLE)]
+    variables = result.variables("/")
+    names = [name for name in _TEXTS if name in variables]
+    names += [name for name in numeric(result) if name not in _IDLE]
     try:
-        found = gather(result, more=[*names, *(name for name in _ERRORS if name in known)])
+        sweep_picture = gather(result, more=[*names, *(name for name in _ERRORS if name in variables)])
     except UsageError as error:  # more axes than a picture has, or none
         return _plain(result, "sweep", [f"{str(error).removeprefix(f'{result.path}: ')}."], None, list, {})
-    sweep = found.critical
+    sweep = sweep_picture.critical
     question = _QUESTIONS["sweep"] if sweep is None else _QUESTIONS["critical"].format(sweep.parameter)
-    drawn = picture(f"Picture of the sweep: {found.summary}", partial(draw, result))
-    said, numbers = _answer(found)
-    answer = [*said, *(f"{each[:1].upper()}{each[1:]}." for each in found.findings)]
-    return _plain(result, "sweep", answer, drawn, partial(_points, result, found, names), numbers, question)
+    drawn = picture(f"Picture of the sweep: {sweep_picture.summary}", partial(draw, result))
+    said, numbers = _answer(sweep_picture)
+    answer = [*said, *(f"{finding[:1].upper()}{finding[1:]}." for finding in sweep_picture.findings)]
+    sections = partial(_points, result, sweep_picture, names)
+    return _plain(result, "sweep", answer, drawn, sections, numbers, question)
 
 
-def _points(result: StoredResult, found: SweepPicture, names: list[str]) -> list[Section]:
+def _points(result: StoredResult, sweep_picture: SweepPicture, names: list[str]) -> list[Section]:
     """The points of a sweep with all their values, their errors and warnings."""
-    points: list[Any] = [*maps(found, names)]
+    points: list[Any] = [*maps(sweep_picture, names)]
     if not points:
         points.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
-    axes = [(axis.key, f"{len(axis.values)} values", f"{axis.text(0)} to {axis.text(-1)}") for axis in found.axes]
+    axes = [
+        (axis.key, f"{len(axis.values)} values", f"{axis.text(0)} to {axis.text(-1)}")
+        for axis in sweep_picture.axes
+    ]
     grid = Table(axes, ("key", "values", "from, to"))
-    errors = {name: np.asarray(found.variables.get(name, np.nan), float) for name in _ERRORS}
+    errors = {name: np.asarray(sweep_picture.variables.get(name, np.nan), float) for name in _ERRORS}
     accuracy = [
-        (name.replace("_", " "), shown(float(np.nanmax(np.abs(values))), found.units[name]))
+        (name.replace("_", " "), shown(float(np.nanmax(np.abs(values))), sweep_picture.units[name]))
         for name, values in errors.items()
         if np.isfinite(values).any()
     ]
@@ -118,22 +123,22 @@ def _points(result: StoredResult, found: SweepPicture, names: list[str]) -> list
     ]
 
 
-def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
+def _answer(sweep_picture: SweepPicture) -> tuple[list[str], Numbers]:
     """What the points say, and at which of them the most and the least; and the numbers of that."""
-    done = found["status"] == Status.DONE
+    done = sweep_picture["status"] == Status.DONE
     name = "amplitude"
     words = "largest amplitude"
     end = np.nanargmax
-    if found.critical is not None:
+    if sweep_picture.critical is not None:
         name = "critical"
         words = "least critical value"
         end = np.nanargmin
     size = done.size
-    values = found[name]
+    values = sweep_picture[name]
     numbers: dict[str, tuple[Any, str]] = {"points": (size, "1")}
-    if found.critical is None:
-        lasting = np.isin(found["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
-        kinds, counts = np.unique(found["regime"][done], return_counts=True)
+    if sweep_picture.critical is None:
+        lasting = np.isin(sweep_picture["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
+        kinds, counts = np.unique(sweep_picture["regime"][done], return_counts=True)
         regimes = dict(zip(kinds.tolist(), counts.tolist(), strict=True))
         said = [sentence(regimes_sentence(regimes, size))]
         numbers |= {f"{kind} at": (count, "1") for kind, count in regimes.items()}
@@ -142,13 +147,13 @@ def _answer(found: SweepPicture) -> tuple[list[str], Numbers]:
         there = int(np.isfinite(values).sum())
         said = [f"A critical value is found at {there} of {size} points."]
         numbers["with a critical value"] = there, "1"
-    said += (f"Attractor {each}." for each in found.attractors)
+    said += (f"Attractor {attractor}." for attractor in sweep_picture.attractors)
     if np.isfinite(values).any():
-        place = np.unravel_index(end(values), values.shape)
-        where = found.named(place[1:])
-        value = float(f"{values[place]:.4g}")
-        said.append(f"The {words} is {shown(value, found.units[name])}, at {where}.")
-        numbers |= {words: (value, found.units[name]), f"{words} at": (where, "")}
+        index = np.unravel_index(end(values), values.shape)
+        where = sweep_picture.named(index[1:])
+        value = float(f"{values[index]:.4g}")
+        said.append(f"The {words} is {shown(value, sweep_picture.units[name])}, at {where}.")
+        numbers |= {words: (value, sweep_picture.units[name]), f"{words} at": (where, "")}
     return said, numbers
 
 
@@ -161,20 +166,20 @@ def part_of_other(result: StoredResult) -> Part:
     declared = {"stability": LOCK_IN, "branch": BRANCH, "scatter": SCATTER}
     apart = ("title", "recommended", "sentence")
     key = _unit_of_key(result)
-    known = [
-        replace(each, units=key) if each.units == "of the key" else each
-        for each in declared.get(kind, fields.COMPARISON)
-        if each.name not in apart and each.in_file
+    single = [
+        replace(field, units=key) if field.units == "of the key" else field
+        for field in declared.get(kind, fields.COMPARISON)
+        if field.name not in apart and field.in_file
     ]
-    held = stored_numbers(result)
-    results = [each for each in known if not each.name.endswith("_error") and "windows" not in each.name]
+    numbers = stored_numbers(result)
+    results = [field for field in single if not field.name.endswith("_error") and "windows" not in field.name]
     compared = numbers_of(results, result.attributes)  # how well a number is known is none to compare by
     drawn = picture(_PICTURES[kind], partial(draw, result))
     views = {
-        "stability": lambda: of_lock_in(held, PAGE, key),
-        "branch": lambda: of_branch(held, "", key, PAGE),
-        "scatter": lambda: of_scatter(held, ""),
-        "comparison": lambda: of_comparison(held, {}, ""),
+        "stability": lambda: of_lock_in(numbers, PAGE, key),
+        "branch": lambda: of_branch(numbers, "", key, PAGE),
+        "scatter": lambda: of_scatter(numbers, ""),
+        "comparison": lambda: of_comparison(numbers, {}, ""),
     }
     view = views[kind]()
     answer = [*view.answer]
@@ -184,13 +189,14 @@ def part_of_other(result: StoredResult) -> Part:
         answer.append(said)
         study = [Section("Study", tables_of_study)]
         shares = {
-            f"probability: {PROBABLE.get(name, name)}": share(each) for name, each in held["probability"].items()
+            f"probability: {PROBABLE.get(name, name)}": share(value)
+            for name, value in numbers["probability"].items()
         }
         compared = {**shares, **compared}
     part = _plain(result, kind, answer, drawn, lambda: [*study, Section("Numbers", blocks_of(view))], compared)
-    if kind != "scatter" or "squeal" not in held["probability"]:
+    if kind != "scatter" or "squeal" not in numbers["probability"]:
         return part
-    middle, low, high = (float(held[name]["squeal"]) for name in _PROBABILITY)
+    middle, low, high = (float(numbers[name]["squeal"]) for name in _PROBABILITY)
     return replace(part, squeal=(middle, low, high))
 
 
@@ -205,17 +211,17 @@ def _study(result: StoredResult) -> tuple[str, list[Table]]:
         raise style.unreadable(result, f"the study in it is not valid: {error.problems[0]}") from error
     laws = [
         (
-            ", ".join(each.paths),
-            each.distribution,
+            ", ".join(law.paths),
+            law.distribution,
             ", ".join(
-                f"{name} {shown(value, key_unit(each.paths[0]))}"
+                f"{name} {shown(value, key_unit(law.paths[0]))}"
                 for name in ("mean", "deviation", "mode", "low", "high")
-                if (value := getattr(each, name)) is not None
+                if (value := getattr(law, name)) is not None
             ),
         )
-        for each in study.parameter
+        for law in study.parameter
     ]
-    asked = [
+    settings = [
         (
             name,
             shown(getattr(study, name), "Hz" if name == "band" else ""),
@@ -224,10 +230,10 @@ def _study(result: StoredResult) -> tuple[str, list[Table]]:
         for name in ("samples", "seed", "sampling", "method", "band", "indices_of", "correlation")
         if getattr(study, name) is not None
     ]
-    band = " from {} to {}".format(*(shown(each, "Hz") for each in study.band)) if study.band else ""
+    band = " from {} to {}".format(*(shown(bound, "Hz") for bound in study.band)) if study.band else ""
     scatter = f"{', '.join(study.names)} {'scatters' if len(study.names) == 1 else 'scatter'}"
     said = f"Such brakes are those of the case in which {scatter}; squeal is a vibration of their own{band}."
-    return said, [Table(laws, ("what scatters", "distribution", "its numbers")), Table(asked)]
+    return said, [Table(laws, ("what scatters", "distribution", "its numbers")), Table(settings)]
 
 
 def _unit_of_key(result: StoredResult) -> str:
@@ -262,11 +268,11 @@ def _plain(
     attributes = result.attributes
 
     def every() -> list[Section]:
-        given = str(
+        source = str(
             attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", "")
         )
         line = f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5"
-        again = repeat(result, line, given)
+        again = repeat(result, line, source)
         over = f"; its case is {case_file or 'the one above'}"
         shown = "a whole" if "CASE" in line else f"it was given{over}"
         again.append(Texts([f"{_stands_for(line)}, which is above as {shown}."]))

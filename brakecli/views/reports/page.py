@@ -40,7 +40,7 @@ def write_report(
     from brakecli.views.reports.of_several import beside
     from brakecli.views.reports.of_sweep import part_of_other, part_of_sweep
 
-    def part(stored: StoredResult) -> "Part":
+    def part_of(stored: StoredResult) -> "Part":
         kind = str(stored.attributes.get("kind"))
         if kind == "run":
             return part_of_run(stored, progress)
@@ -55,7 +55,7 @@ def write_report(
         for number, result in enumerate(results):
             progress("results", number, len(results))
             opened.append(stack.enter_context(open_result(result)))
-            parts.append(part(opened[-1]))
+            parts.append(part_of(opened[-1]))
         together = beside(opened, parts, full) if 2 <= len(results) <= MOST else None
         if together:
             parts = [replace(part, title=title) for part, title in zip(parts, together.titles, strict=True)]

@@ -65,9 +65,9 @@ def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
     names = names if size <= _WORDY else [name for name in names if name != "reason"]
     for way in picture.directions if size <= MOST else ():
         piece = picture.towards(way)
-        for title, part in slices(piece) if len(piece.axes) == 3 else [("", piece)]:
+        for title, layer in slices(piece) if len(piece.axes) == 3 else [("", piece)]:
             titles = [f"on the way {way}"] * bool(way) + [title] * bool(title)
-            yield _map(part, names, ", ".join(titles))
+            yield _map(layer, names, ", ".join(titles))
 
 
 def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
@@ -76,18 +76,18 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
     y = Side("", [0.0, 40.0], [""], [""]) if flat else _side(picture.axes[1], HEIGHT, upwards=True)
     shape = len(x.values), len(y.values)
     colours, legend = _colours(picture)
-    found: dict[str, list[str]] = {}
+    cells: dict[str, list[str]] = {}
     letters = []
     for i, j in product(*map(range, shape)):
-        left, right = x.edges[i : i + 2]
+        x_low, x_high = x.edges[i : i + 2]
         one, other = y.edges[j : j + 2]
         low = min(one, other)
         high = max(one, other)
-        cell = f"M{left:.4g} {low:.4g}H{right:.4g}V{high:.4g}H{left:.4g}z"
-        found.setdefault(colours.reshape(shape)[i, j], []).append(cell)
+        cell = f"M{x_low:.4g} {low:.4g}H{x_high:.4g}V{high:.4g}H{x_low:.4g}z"
+        cells.setdefault(colours.reshape(shape)[i, j], []).append(cell)
         letter = _LETTERS.get(picture["regime"].reshape(shape)[i, j], "") if picture.critical is None else ""
-        if letter and right - left > _LEAST_LETTER < high - low:
-            letters.append((0.5 * (left + right), 0.5 * (low + high) + 4.0, letter))
+        if letter and x_high - x_low > _LEAST_LETTER < high - low:
+            letters.append((0.5 * (x_low + x_high), 0.5 * (low + high) + 4.0, letter))
     columns = {}
     for name in names:
         values = picture[name].reshape(shape)
@@ -95,7 +95,7 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
         columns[name.replace("_", " ")] = _numbers(values, unit) if values.dtype.kind in "iuf" else _texts(values)
     data = {"x": x.edges, "y": y.edges, "xs": x.values, "ys": y.values, "names": [x.label, y.label]}
     data["columns"] = columns
-    return Map(title, x, y, [(colour, "".join(paths)) for colour, paths in found.items()], letters, legend, data)
+    return Map(title, x, y, [(colour, "".join(paths)) for colour, paths in cells.items()], letters, legend, data)
 
 
 def _side(axis: Axis, length: float, upwards: bool = False) -> Side:
@@ -113,17 +113,17 @@ def _side(axis: Axis, length: float, upwards: bool = False) -> Side:
 def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]:
     """The colour of every point, and what colours mean."""
     if picture.critical is None:
-        known = {str(regime): colour for regime, (colour, _) in REGIMES.items()} | {"": _NONE}
+        colour_of = {str(regime): colour for regime, (colour, _) in REGIMES.items()} | {"": _NONE}
         regimes = picture["regime"].astype(str)
-        present = [name for name in known if (regimes == name).any()]
-        legend = [(known[name], name or "failed") for name in present]
-        return np.vectorize(known.get, otypes=[object])(regimes), legend
+        present = [name for name in colour_of if (regimes == name).any()]
+        legend = [(colour_of[name], name or "failed") for name in present]
+        return np.vectorize(colour_of.get, otypes=[object])(regimes), legend
     values = picture["critical"]
     shades = colormaps["cividis"]
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if there.size else (0.0, 1.0)
     level = np.round(np.nan_to_num((values - low) / ((high - low) or 1.0)) * (_SHADES - 1)) / (_SHADES - 1)
-    colours = np.vectorize(lambda each: to_hex(shades(float(each))), otypes=[object])(level)
+    colours = np.vectorize(lambda fraction: to_hex(shades(float(fraction))), otypes=[object])(level)
     unit = picture.units["critical"]
     ends = [(to_hex(shades(end)), shown(float(f"{value:.4g}"), unit)) for end, value in ((0.0, low), (1.0, high))]
     return np.where(np.isfinite(values), colours, _NONE), [*ends, (_NONE, "none found")]
@@ -134,10 +134,10 @@ def _numbers(values: style.Array, unit: str) -> dict[str, Any]:
     factor, unit = style.prefixed(style.largest(values), unit)
     digits = 5 if values.size <= _WORDY else 4
 
-    def kept(x: float) -> float | None:
+    def shortened(x: float) -> float | None:
         return float(f"{factor * x:.{digits}g}") if np.isfinite(x) else None
 
-    return {"unit": unit, "values": [[*map(kept, row)] for row in values.tolist()]}
+    return {"unit": unit, "values": [[*map(shortened, row)] for row in values.tolist()]}
 
 
 def _texts(values: style.Array) -> dict[str, Any]:
