@@ -203,7 +203,7 @@ class Accessor(Shown):
         rows += [Row("note", note) for note in (*self._texts("notes"), *self.warnings)]
         return View(title, sentences(answer), rows)
 
-    def _evidence(self) -> dict[str, Any]:
+    def _evidence(self) -> dict[str, object]:
         """The numbers by which a verdict was decided."""
         if "regime" in self._groups and "evidence" in self._groups["regime"].children:
             evidence = self._groups["regime"]["evidence"].attrs
@@ -244,7 +244,7 @@ class Accessor(Shown):
         return tuple(kind(**record) for record in ([records] if isinstance(records, dict) else records))
 
 
-def _without_numpy(value: Any) -> Any:
+def _without_numpy(value: object) -> object:
     """A value without NumPy; None where there is none."""
     value = value.tolist() if isinstance(value, np.generic | np.ndarray) else value
     return None if value != value or value == "" else value  # NaN

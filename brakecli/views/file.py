@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from brakecli.errors import value_text
@@ -18,8 +18,6 @@ if TYPE_CHECKING:  # what one command prints need not wait for the modules of th
 _ASIDE = ("title", "regime/", "adjustments", "reasons", "warnings", "modelled", "left_out")  # long, and in --json
 _MAIN = ("regime", "frequency", "amplitude", "excitation", "stick_fraction", "contact_loss_fraction", "critical")
 """Numbers that come first."""
-SHORT = 2
-"""Keys of the case of which a short answer says how they differ, and one number more."""
 
 
 def of_check(check: Check, title: str, show: Renderer) -> View:
@@ -114,7 +112,7 @@ def of_info(numbers: Mapping[str, Any]) -> View:
 def of_difference(numbers: Mapping[str, Any], files: Mapping[str, str], show: Renderer) -> View:
     """What differs in a sentence; the main keys and numbers, and on demand all, each side by side."""
     blocks: list[Row | Table] = []
-    for topic, shown in (("case", SHORT), ("numbers", SHORT + 1), ("versions", 0)):
+    for topic, shown in {"case": 2, "numbers": 3, "versions": 0}.items():  # so many rows in a short answer
         rows = [row for row in numbers[topic] if not row["name"].startswith(_ASIDE)]
         rows.sort(key=lambda row: _MAIN.index(row["name"]) if row["name"] in _MAIN else len(_MAIN))
         if rows:
@@ -130,13 +128,13 @@ def of_difference(numbers: Mapping[str, Any], files: Mapping[str, str], show: Re
             "differ": [f"{variable['different']} of {variable['compared']}" for variable in variables],
             "by at most": [text_of(variable["largest"], variable["units"], ".3g") for variable in variables],
             "of the largest": [text_of(variable["relative"], form=".2%") for variable in variables],
-            "shapes": [_shapes(variable) for variable in variables],
+            "shapes": [_shapes(variable["shapes"]) for variable in variables],
         }
         if all(variable["shapes"][0] == variable["shapes"][1] for variable in variables):
             del columns["shapes"]
         blocks.append(Table(columns, first=0))
     if alike:
-        named = ", ".join(f"{_path(variable)} ({_shapes(variable)})" for variable in alike)
+        named = ", ".join(f"{_path(variable)} ({_shapes(variable['shapes'])})" for variable in alike)
         blocks.append(Row("alike", f"the same where both have values, of different lengths: {named}", detail=True))
     if along := {variable["interpolated"]: None for variable in numbers["variables"] if variable["interpolated"]}:
         how = f"compared at equal {' and '.join(along)}; the finer result is interpolated"
@@ -147,28 +145,24 @@ def of_difference(numbers: Mapping[str, Any], files: Mapping[str, str], show: Re
 
 
 def _sides(
-    what: str, rows: list[Mapping[str, Any]], files: Mapping[str, str], show: Renderer, first: int
+    what: str, rows: Sequence[Mapping[str, object]], files: Mapping[str, str], show: Renderer, first: int
 ) -> Table:
     """Names, and the values of both files."""
-    columns = {what: [row["name"] for row in rows]}
+    columns = {what: [str(row["name"]) for row in rows]}
     for side in ("a", "b"):
-        columns[files[side]] = [_value(row[side], row.get("units"), show) for row in rows]
+        columns[files[side]] = [_value(row[side], str(row.get("units") or ""), show) for row in rows]
     return Table(columns, first=first)
 
 
-def _value(value: Any, units: str | None, show: Renderer) -> str:
+def _value(value: object, units: str, show: Renderer) -> str:
     if isinstance(value, float) or value is None:
-        return show.text(value, units or "")
+        return show.text(value, units)
     return value_text(value).strip('"')
 
 
-def _path(variable: Mapping[str, Any]) -> str:
+def _path(variable: Mapping[str, object]) -> str:
     return f"{variable['group']}/{variable['name']}".replace("//", "")
 
 
-def _shapes(variable: Mapping[str, Any]) -> str:
-    return " and ".join(map(_shape, variable["shapes"]))
-
-
-def _shape(shape: Any) -> str:
-    return "-" if shape is None else " x ".join(map(str, shape))
+def _shapes(shapes: Sequence[Sequence[int] | None]) -> str:
+    return " and ".join("-" if shape is None else " x ".join(map(str, shape)) for shape in shapes)

@@ -24,7 +24,6 @@ _FORCED = "it does not vibrate by itself, the roughness of the wheel shakes it (
 _FEW_STICK = "it vibrates, without stick in most cycles (quasi-harmonic)"
 _LENGTH = re.compile(r"(\d+(?:\.\d+)?(?:e[-+]\d+)?) m(?![\w/²·])")
 _TORQUE = ("braking_torque", "torque_variation")
-_ROUNDINGS = 16 * sys.float_info.epsilon  # of the two dozen sums and products of a step, each half of one at most
 _ASIDE = (
     *("excitation", "mean_friction_force", "amplitude_first", "forced_frequency", "growth_rate"),
     *("ringing_frequency", "amplitude_forced", "amplitude_own"),
@@ -156,7 +155,9 @@ def above_rounding(numbers: Mapping[str, Any]) -> dict[str, Any]:
     torque, force = (abs(numbers.get(name) or 0.0) for name in ("braking_torque", "mean_friction_force"))
     links = (numbers.get("energy") or {}).get("links") or 0.0
     sizes = {"torque_variation": torque, "amplitude": 2.0 * links / force if force else 0.0}
-    small = [name for name, size in sizes.items() if abs(numbers.get(name) or 0.0) <= _ROUNDINGS * size]
+    # two dozen sums and products of a step, each of which rounds by half of an epsilon at most
+    rounding = 16 * sys.float_info.epsilon
+    small = [name for name, size in sizes.items() if abs(numbers.get(name) or 0.0) <= rounding * size]
     return {**numbers, **{name: 0.0 for name in small if numbers.get(name) is not None}}
 
 
@@ -195,26 +196,26 @@ def _ringing(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
     return [Row("rings at", frequency), Row("damping ratio", ratio)]
 
 
-def _torque(numbers: Mapping[str, Any], show: Renderer) -> list[Row]:
+def _torque(numbers: Mapping[str, object], show: Renderer) -> list[Row]:
     """The mean braking torque and its variation, where they are known."""
     when = {"torque_variation": _when(numbers)}
     values = _fields_with_values(numbers, *_TORQUE)
     return [Row(field.title, show.field(field, value) + when.get(field.name, "")) for field, value in values]
 
 
-def _when(numbers: Mapping[str, Any]) -> str:
+def _when(numbers: Mapping[str, object]) -> str:
     """From when the amplitude and the variation of the torque are, where a run dies out."""
     run = numbers.get("amplitude_first") is not None
     return ", in the last tenth" * (run and numbers.get("excitation") == Excitation.NONE)
 
 
-def _fields_with_values(numbers: Mapping[str, Any], *names: str) -> list[tuple[Field, Any]]:
+def _fields_with_values(numbers: Mapping[str, object], *names: str) -> list[tuple[Field, object]]:
     """The fields of a verdict that have a value, with it."""
     declared = named(fields.VERDICT, *names)
     return [(field, numbers[field.name]) for field in declared if numbers.get(field.name) is not None]
 
 
-def _certificate(numbers: Mapping[str, Any]) -> list[Row]:
+def _certificate(numbers: Mapping[str, object]) -> list[Row]:
     """What is known of the error of the motion."""
     error = numbers.get("estimated_error")
     certified = numbers.get("certified")
@@ -243,7 +244,7 @@ def _contact(numbers: Mapping[str, Any]) -> str:
     return shares + (f", {numbers['nodes']} nodes" if on_nodes else "")
 
 
-def _tone(numbers: Mapping[str, Any], shown: str) -> str:
+def _tone(numbers: Mapping[str, object], shown: str) -> str:
     """A frequency; before a motion has settled it is not that of the motion which lasts."""
     return shown if shown == "-" or numbers.get("settled", True) else f"{shown}, not settled"
 

@@ -26,8 +26,6 @@ CRITICAL = (*named(fields.POINT, "regime"), *named(fields.CRITICAL, "critical", 
 SEARCHES = named(fields.CRITICAL, "critical_eigenvalue", "critical_sustained", "critical_status")
 """What a search says beside its value, shown where it says something else."""
 MOST_LISTED_POINTS = 200
-MOST_STRETCHES = 6
-"""Stretches of equal regimes along an axis that a row lists."""
 ENTRIES = (
     ("method", "method", ""),
     ("step", "step, s", ".3g"),
@@ -117,7 +115,7 @@ def _where(report: SweepReport, critical: float) -> str:
 
 
 def _stretches(report: SweepReport) -> list[Row]:
-    """Along a single axis: the stretches of equal regimes, where the points are too many to be listed."""
+    """Along a single axis: up to six stretches of equal regimes, where the points are too many to be listed."""
     from brakecli.studies.sweeps.plan import label
 
     findings = report.findings
@@ -138,7 +136,7 @@ def _stretches(report: SweepReport) -> list[Row]:
         ends = [value for _, value in stretch]
         span = dict.fromkeys([ends[0], ends[-1]])
         parts.append(f"{regime or 'failed'} {'at' if len(span) == 1 else 'from'} {' to '.join(span)}")
-    return [Row(axes[0].parameter[0], ", ".join(parts))] if len(parts) <= MOST_STRETCHES else []
+    return [Row(axes[0].parameter[0], ", ".join(parts))] if len(parts) <= 6 else []
 
 
 def _points(report: SweepReport, show: Renderer) -> Table:
@@ -171,7 +169,7 @@ def _points(report: SweepReport, show: Renderer) -> Table:
     return Table(columns, keys=max(keys, 1), first=None if findings.points <= SHORT_POINTS else 0)
 
 
-def _says_more(field: Field, variables: Mapping[str, Any]) -> bool:
+def _says_more(field: Field, variables: Mapping[str, object]) -> bool:
     """Whether a number of a search differs from the critical value by more than that one's error."""
     values = np.ravel(np.array(variables[field.name], object))
     if field.name == "critical_status":
@@ -196,7 +194,7 @@ def _attractors(attractors: Iterable[Attractor]) -> Table:
     return Table(columns)
 
 
-def of_comparison(numbers: Mapping[str, Any], keys: Mapping[str, Any], title: str) -> View:
+def of_comparison(numbers: Mapping[str, Any], keys: Mapping[str, object], title: str) -> View:
     """What is recommended, the entries that no other beats, and on demand the finest of each other method.
 
     `numbers` are those of `--json`; `keys` of a case ask for the recommended method.
@@ -246,12 +244,12 @@ def finer_error(entries: Iterable[Mapping[str, Any]], entry: Mapping[str, Any]) 
     return max((error for error in errors if error is not None), default=0.0)
 
 
-def _method(entry: Mapping[str, Any]) -> tuple[Any, ...]:
+def _method(entry: Mapping[str, object]) -> tuple[str, ...]:
     """What distinguishes a method from others, whatever its step."""
     return tuple(str(entry[name]) for name in ("scheme", "theta", "start", "iteration", "evaluator", "nodes"))
 
 
-def _entry(entry: Mapping[str, Any]) -> str:
+def _entry(entry: Mapping[str, object]) -> str:
     """The method with its step or tolerance."""
     if entry["step"] is not None:
         return f"{entry['method']}, step {entry['step']:.3g} s"

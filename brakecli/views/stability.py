@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypedDict
 
 from brakecli.analysis.stability.advice import percent, rounded
 from brakecli.results import stability_fields as fields
@@ -15,14 +15,28 @@ if TYPE_CHECKING:
     from brakecli.analysis.stability.advice import Change, Left
     from brakecli.studies.runs.advise import AdviceReport
 
-SHORT_ADVICE = 3
-"""Keys to change, and notes, that are shown unless all are asked for."""
-MOVED = 0.05
-"""Part of a frequency beyond which it is said that it moves: less is not heard as another tone; a choice."""
 _MOVES = "Critical friction for 1 % and for 1 unit of a value; growth rate (1/s) for 1 %"
 _STATE = {True: "stable", False: "unstable", None: "-"}
-_MODES = (("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g"))
-"""Headers, factors and formats of the columns of both modes along a key."""
+_Rows = Sequence[Mapping[str, object]]  # by the names of `--json`
+
+
+class _Mode(TypedDict):
+    """A mode among the numbers of `--json`."""
+
+    frequency: float
+    growth: float
+    damping_ratio: float
+    shape: float | None
+    shape_phase: float | None
+
+
+class _Crossing(TypedDict):
+    """A change of stability among the numbers of `--json`."""
+
+    friction: float
+    lost: bool
+    instability: str
+    frequency: float
 
 
 def of_stability(numbers: Mapping[str, Any], title: str, show: Renderer, units: str = "") -> View:
@@ -35,8 +49,9 @@ def of_stability(numbers: Mapping[str, Any], title: str, show: Renderer, units: 
     crossings = numbers["crossings"]
     critical = numbers["critical_friction"]
     equilibrium = numbers["equilibrium"]
-    answer = [numbers.get("sentence") or _without_loss(numbers), _at_own(numbers, show)]
-    rows = [Row("critical friction", _critical(numbers, show))]
+    answer = [numbers.get("sentence") or _without_loss(numbers), _at_own(modes, numbers["stable"], phi, show)]
+    lost = [crossing for crossing in crossings if crossing["friction"] == critical]
+    rows = [Row("critical friction", _critical(lost, numbers["critical_error"], show))]
     others = [_crossing(crossing, show) for crossing in crossings if crossing["friction"] != critical]
     rows += [Row("also changes at", text) for text in others]
     if numbers.get("coexists_from") is not None:
@@ -50,13 +65,13 @@ def of_stability(numbers: Mapping[str, Any], title: str, show: Renderer, units: 
         touching = f"{100.0 * equilibrium['contact_fraction']:.3g} % of the pad touches"
         rows.append(Row("steady sliding", f"y = {position}, F_y = {force}, {touching}"))
     undamped = {kind: numbers[f"undamped_{kind}_friction"] for kind in ("flutter", "divergence")}
-    lost = [f"{kind} at {show.text(friction)}" for kind, friction in undamped.items() if friction is not None]
+    losses = [f"{kind} at {show.text(friction)}" for kind, friction in undamped.items() if friction is not None]
     stiffness = show.with_error(numbers["contact_stiffness"], numbers["contact_stiffness_error"], "N/m")
     shapes = [Row(f"shape at {show.text(mode['frequency'], 'Hz')}", _shape(mode)) for mode in modes]
     aside = [
         Row("surface speed U", show.text(numbers["belt_speed"], "m/s")),
         Row("contact stiffness K", stiffness),
-        Row("without dashpots", ", ".join(lost) or "neither flutter nor divergence"),
+        Row("without dashpots", ", ".join(losses) or "neither flutter nor divergence"),
         Row(f"at φ = {phi:g}", _STATE[numbers["stable"]]),
         *shapes,
     ]
@@ -80,7 +95,7 @@ def of_lock_in(numbers: Mapping[str, Any], show: Renderer, units: str) -> View:
     return View("", [sentence(answer)], [_along(numbers["vary"], numbers["parameters"])])
 
 
-def _without_loss(numbers: Mapping[str, Any]) -> str:
+def _without_loss(numbers: Mapping[str, object]) -> str:
     """What there is to say where no vibration beside stable sliding was sought."""
     if numbers["no_equilibrium"]:
         return f"there is no steady sliding: {numbers['no_equilibrium']}"
@@ -89,28 +104,28 @@ def _without_loss(numbers: Mapping[str, Any]) -> str:
     return "no change of stability by friction is found"
 
 
-def _at_own(numbers: Mapping[str, Any], show: Renderer) -> str:
+def _at_own(modes: Sequence[_Mode], stable: bool | None, friction: float, show: Renderer) -> str:
     """What the case's own friction coefficient gives."""
-    if not numbers["modes"] or numbers["stable"] is None:
+    if not modes or stable is None:
         return ""
-    first = numbers["modes"][0]
+    first = modes[0]
     growth = f"{'grows' if first['growth'] > 0.0 else 'decays'} at {abs(first['growth']):.4g} 1/s"
-    where = f"at the case's {numbers['friction_coefficient']:g} sliding is {_STATE[numbers['stable']]}"
+    where = f"at the case's {friction:g} sliding is {_STATE[stable]}"
     return f"{where}: its least stable mode ({show.text(first['frequency'], 'Hz')}) {growth}"
 
 
-def _mode(mode: Mapping[str, Any]) -> str:
+def _mode(mode: _Mode) -> str:
     motion = f"{'grows' if mode['growth'] > 0.0 else 'decays'} at {abs(mode['growth']):.4g} 1/s"
     return f"{motion}, damping ratio {mode['damping_ratio']:.3g}"
 
 
-def _shape(mode: Mapping[str, Any]) -> str:
+def _shape(mode: _Mode) -> str:
     if mode["shape"] is None or mode["shape_phase"] is None:
         return "along y alone"
     return f"y/x {mode['shape']:.3g} at {round(mode['shape_phase'])}°"
 
 
-def _scheme(discrete: Mapping[str, Any] | None, show: Renderer) -> list[Row]:
+def _scheme(discrete: Mapping[str, object] | None, show: Renderer) -> list[Row]:
     """What the scheme of a case makes of it at its step."""
     if discrete is None:
         return []
@@ -129,7 +144,8 @@ def _along(entries: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> T
     """Critical friction and both modes along a key."""
     columns = {"value": [f"{entry['value']:.6g}" for entry in entries]}
     columns |= {field.title: [text_of(entry[field.name]) for entry in entries] for field in fields.VARIED}
-    for field, (head, factor, form) in zip(fields.MODES, _MODES, strict=True):
+    looks = ("frequency {}, Hz", 1.0, ".5g"), ("growth {}, 1/s", 1.0, ".4g"), ("damping {}, %", 100.0, ".3g")
+    for field, (head, factor, form) in zip(fields.MODES, looks, strict=True):
         for mode in (0, 1):
             values = [entry[field.name][mode] for entry in entries]
             shown = [None if value is None else factor * value for value in values]
@@ -137,18 +153,16 @@ def _along(entries: Sequence[Mapping[str, Any]], parameters: Sequence[str]) -> T
     return Table(columns, f"Along {', '.join(parameters)}", first=None if len(entries) <= SHORT_POINTS else 0)
 
 
-def _critical(numbers: Mapping[str, Any], show: Renderer) -> str:
+def _critical(lost: Sequence[_Crossing], error: float | None, show: Renderer) -> str:
     """The least friction coefficient at which stability is lost, with its error, and how it is lost."""
-    lost = [crossing for crossing in numbers["crossings"] if crossing["friction"] == numbers["critical_friction"]]
     if not lost:
         return "none"
-    error = numbers["critical_error"]
     if error is None:
         return f"{_crossing(lost[0], show)}, but single windows of the waves have none near it"
     return _crossing(lost[0], show, error)
 
 
-def _crossing(crossing: Mapping[str, Any], show: Renderer, error: float | None = None) -> str:
+def _crossing(crossing: _Crossing, show: Renderer, error: float | None = None) -> str:
     change = "lost" if crossing["lost"] else "regained"
     where = f" at {show.text(crossing['frequency'], 'Hz')}" if crossing["frequency"] else ""
     return (
@@ -182,7 +196,7 @@ def of_advice(report: AdviceReport, show: Renderer) -> View:
         blocks += details(Row("why", "; ".join(check.verdict.reasons)))
     if changes := _ordered([change for change in report.advice if change.to is not None], report.mildest):
         apart = report.mildest not in (None, changes[0].parameter)
-        first = max(SHORT_ADVICE - len(notes), 1 + apart)  # a short answer has twelve lines; a note takes one
+        first = max(3 - len(notes), 1 + apart)  # a short answer has twelve lines; a note takes one
         blocks.append(Table(_advice(changes, report.squeal), report.ranking, first=first))
     if vain := [change for change in report.advice if change.to is None]:
         blocks.append(Table(_without_help(vain), "No help within bounds", first=0))
@@ -232,7 +246,8 @@ def _moved(remaining: Left | None, drawn: Left) -> str:
     """The frequency of what is left of squeal, where it differs from that of the drawing by more than 5 %."""
     if remaining is None or not remaining.squeal_frequency or not drawn.squeal_frequency:
         return ""
-    far = abs(remaining.squeal_frequency / drawn.squeal_frequency - 1.0) > MOVED
+    # less is not heard as another tone; a choice
+    far = abs(remaining.squeal_frequency / drawn.squeal_frequency - 1.0) > 0.05
     return f", {remaining.squeal_frequency:.4g} Hz" if far else ""
 
 
@@ -273,7 +288,7 @@ def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer
         rows.append(Row("file", str(numbers["output"])))
     tables = []
     for number, branch in enumerate(numbers["branches"] or ()):
-        points = _off_flutter(branch)
+        points = _off_flutter(branch["points"], branch["special"])
         stable = sum(bool(point["stable"]) for point in points)
         there = " beside the one at flutter" * (len(points) < len(branch["points"]))
         head = f"branch {number}: {branch['kind']}, {len(points)} motions{there}, {stable} of them stable"
@@ -285,24 +300,24 @@ def of_branch(numbers: Mapping[str, Any], title: str, units: str, show: Renderer
     return View(title, sentences([str(numbers["sentence"] or "")]), [*rows, *tables])
 
 
-def _off_flutter(branch: Mapping[str, Any]) -> list[Any]:
+def _off_flutter(motions: _Rows, marks: _Rows) -> list[Mapping[str, object]]:
     """The motions of a branch without an end at flutter: sliding is neutral there, and so are its vibrations."""
-    points = [*branch["points"]]
-    sizes = [mark["amplitude"] for mark in branch["special"] if mark["kind"] == "flutter" and mark["amplitude"]]
+    inner = [*motions]
+    sizes = [mark["amplitude"] for mark in marks if mark["kind"] == "flutter" and mark["amplitude"]]
     for end in (0, -1):
-        if points and points[end]["amplitude"] in sizes:
-            points.pop(end)
-    return points
+        if inner and inner[end]["amplitude"] in sizes:
+            inner.pop(end)
+    return inner
 
 
-def _special_points(marks: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+def _special_points(marks: _Rows) -> dict[str, list[str]]:
     return {
-        "special point": [mark["kind"] for mark in marks],
+        "special point": [str(mark["kind"]) for mark in marks],
         "value": [f"{mark['value']:.8g}" for mark in marks],
         "error": [f"{mark['error']:.1g}" if mark["error"] else "-" for mark in marks],
         "amplitude, m": [text_of(mark["amplitude"] or None, form=".4g") for mark in marks],
         "frequency, Hz": [text_of(mark["frequency"] or None, form=".5g") for mark in marks],
-        "why": [mark["reason"] or "-" for mark in marks],
+        "why": [str(mark["reason"] or "-") for mark in marks],
     }
 
 

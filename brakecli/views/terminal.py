@@ -6,8 +6,6 @@ from itertools import groupby
 from brakecli.errors import escaped
 from brakecli.views.view import Row, Table, View
 
-NARROWEST = 40  # columns of a table, whatever the terminal says: nothing can be read in fewer
-
 
 def terminal_text(view: View, *, details: bool = False) -> str:
     """A view as text, with all that is known if `details`."""
@@ -52,7 +50,7 @@ def grid(columns: Mapping[str, Sequence[str]], keys: int = 1, *, show_header: bo
     from rich.table import Table as RichTable
 
     console = Console(markup=False, emoji=False, highlight=False)  # titles and file names are not markup
-    room = max(console.width, NARROWEST)
+    room = max(console.width, 40)  # columns, whatever the terminal says: nothing can be read in fewer
     console.width = room
     texts = {escaped(header): [*map(escaped, cells)] for header, cells in columns.items()}
     heads = {header: header if show_header else "" for header in texts}

@@ -305,7 +305,7 @@ def test_numbers_that_an_older_file_lacks_are_named_with_the_remedy(
 def test_a_branch_that_regains_its_stability_has_no_gap() -> None:
     """The special point that tells where stands between two motions."""
     columns = {"value": np.arange(4.0), "stable": np.array([0.0, 0.0, 1.0, 1.0]), "frequency": np.arange(4.0)}
-    marks = {"kind": ["fold"], "value": [1.25], "frequency": [1.5]}
+    marks = {"kind": np.array(["fold"]), "value": np.array([1.25]), "frequency": np.array([1.5])}
     axes = Figure().subplots()
     _line(axes, _with_ends(columns, marks), "frequency", DARK)
     drawn: list[Any] = axes.get_lines()

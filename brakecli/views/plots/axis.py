@@ -10,14 +10,6 @@ from matplotlib.axis import XAxis, YAxis
 
 from brakecli.views.plots import style
 
-_LONGEST_KEY = 45
-_MOST_TEXTS = 30
-_MOST_CHARACTERS = 70
-_FEW = 6  # values of an axis up to which each has its tick
-_MORE_ALIKE = 0.999  # spread of ratios over that of distances: where both are the same, the axis is linear
-_APART = 0.1  # of an axis: values that are nearer to each other have no tick each
-_LEAST_LOG = 5.0  # ratio of the ends of a logarithmic axis; below it, linear ticks are easier to read
-
 
 @dataclass(frozen=True)
 class Axis:
@@ -34,11 +26,14 @@ class Axis:
     def logarithmic(self) -> bool:
         """Whether the ratios of neighbours are more alike than their distances."""
         values = self.values
-        if self.texts is not None or len(values) < 3 or values[0] <= 0.0 or values[-1] < _LEAST_LOG * values[0]:
+        if self.texts is not None or len(values) < 3 or values[0] <= 0.0:
+            return False
+        if values[-1] < 5.0 * values[0]:  # linear ticks are easier to read
             return False
         steps = np.diff(values)
         ratios = np.diff(np.log(values))
-        return bool(np.std(ratios) / np.mean(ratios) < _MORE_ALIKE * np.std(steps) / np.mean(steps))
+        # where both spreads are the same but for rounding, the axis is linear
+        return bool(np.std(ratios) / np.mean(ratios) < 0.999 * np.std(steps) / np.mean(steps))
 
     @property
     def edges(self) -> style.Array:
@@ -83,17 +78,18 @@ class Axis:
         texts = self.texts
         factor, units = style.prefixed(style.largest(values), self.units)
         if texts is not None:
-            step = -(-len(texts) // _MOST_TEXTS)
-            slanted = side == "x" and sum(map(len, texts)) > _MOST_CHARACTERS
+            step = -(-len(texts) // 30)  # so many at most
+            slanted = side == "x" and sum(map(len, texts)) > 70  # characters, which do not fit beside each other
             turned: dict[str, Any] = {"rotation": 30, "ha": "right", "rotation_mode": "anchor"} if slanted else {}
             axis.set_ticks(values[::step], labels=texts[::step], parse_math=False, **turned)
             axis.axes.set(**{f"{side}lim": (-0.5, len(texts) - 0.5)})
             axis.grid(False)
-        elif not self.logarithmic and len(values) <= _FEW and np.diff(values).min() > _APART * np.ptp(values):
+        elif not self.logarithmic and len(values) <= 6 and np.diff(values).min() > 0.1 * np.ptp(values):
+            # few, and far enough apart that each has its tick
             axis.set_ticks(values, labels=[style.readable(factor * float(value), self.digits) for value in values])
         else:
             if self.logarithmic:
                 axis.axes.set(**{f"{side}scale": "log"})
             style.set_ticks(axis, values[0], values[-1], self.units)
-        key = textwrap.shorten(self.key, _LONGEST_KEY, placeholder=" …") + ", from equilibrium" * self.offset
+        key = textwrap.shorten(self.key, 45, placeholder=" …") + ", from equilibrium" * self.offset
         axis.set_label_text(style.labelled(key, units), parse_math=False)

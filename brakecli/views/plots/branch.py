@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,15 +13,9 @@ from brakecli.faces import argument
 from brakecli.results.read import StoredResult
 from brakecli.views.plots import style
 
-# inches
-_WIDTH = 8.8
-_HEIGHT = 6.6
 _OF_ALL = style.BLUE, style.VERMILION, style.GREEN, style.ORANGE, "#CC79A7", "#56B4E9"  # Okabe and Ito
 _COLOURS = (*_OF_ALL, "#7F4F24", "#6A3D9A", "#808000", "#1A237E", "#B2182B")  # of twelve with steady sliding
 _SIZE = 4.0  # of a mark, in points
-_APART = 1.5  # widths of a mark by which two of one kind are drawn apart; a choice
-_IN_ROW = 4  # entries of the legend beside each other
-_ENTRY = 0.19  # inches, of its rows
 _MARKERS = {
     "flutter": "o",
     "divergence": "X",
@@ -35,10 +28,6 @@ _MARKERS = {
     "budget": "x",
     "end": "",  # where the line ends, without a mark
 }
-_THRESHOLDS: tuple[tuple[str, str, Any], ...] = (
-    ("critical", "squeals by itself", style.DOTS),
-    ("coexists_from", "can vibrate", (0, (6, 2, 1, 2))),
-)
 _SLIDING = "steady sliding"
 _QUANTITIES = {  # the words at their axis
     "amplitude": "amplitude of x",
@@ -51,8 +40,6 @@ _QUANTITIES = {  # the words at their axis
     "contact_loss_fraction": "contact loss fraction",
 }
 _SHORT = {"x": "amplitude", "y": "amplitude_y", "vx": "amplitude_vx", "mean": "mean_x"}
-_WIDE = 30.0  # ratio of amplitudes from which on their axis is logarithmic
-_BELOW = 0.4  # of the least amplitude: there steady sliding stands on a logarithmic axis, on which 0 has no place
 
 
 @dataclass(frozen=True)
@@ -60,8 +47,8 @@ class _Branch:
     """A branch: its motions in columns, and its special points."""
 
     kind: str
-    columns: dict[str, style.Array]
-    marks: dict[str, style.Array]
+    columns: style.Columns
+    marks: style.Columns
 
     @property
     def slides(self) -> bool:
@@ -90,14 +77,18 @@ def draw(result: StoredResult, variable: str = "") -> Figure:
     attributes = result.attributes
     lines = str(attributes.get("title", "")), str(attributes.get("sentence", ""))
     kinds = {str(kind) for branch in branches for kind in branch.marks["kind"]} & {*filter(_MARKERS.get, _MARKERS)}
-    in_row = _IN_ROW // 2 if style.is_narrow() else _IN_ROW
-    rows = math.ceil((len(branches) + len(kinds) + len(_THRESHOLDS)) / in_row)
-    figure = style.headed(_WIDTH, _HEIGHT + _ENTRY * rows, *lines, hspace=0.05)
+    thresholds = (
+        ("critical", "squeals by itself", style.DOTS),
+        ("coexists_from", "can vibrate", (0, (6, 2, 1, 2))),
+    )
+    in_row = 2 if style.is_narrow() else 4
+    rows = math.ceil((len(branches) + len(kinds) + len(thresholds)) / in_row)  # of the legend
+    figure = style.headed(8.8, 6.6 + 0.19 * rows, *lines, hspace=0.05)
     heights = [1.6, 1.0][: len(names)]
     panels = figure.subplots(len(names), 1, sharex=True, height_ratios=heights, squeeze=False)[:, 0]
     for axes, name in zip(panels, names, strict=True):
         _panel(axes, branches, name, style.unit_of(variables[name].attributes))
-        for threshold, text, look in _THRESHOLDS:
+        for threshold, text, look in thresholds:
             value = attributes.get(threshold)
             if isinstance(value, int | float) and math.isfinite(value):
                 label = f"{text} from {value:.4g} on"
@@ -133,9 +124,9 @@ def _panel(axes: Axes, branches: list[_Branch], name: str, unit: str) -> None:
     sizes = np.concatenate([np.zeros(0), *(branch.columns[name] for branch in branches if not branch.slides)])
     sizes = sizes[sizes > 0.0]
     floor = -np.inf
-    if name.startswith("amplitude") and len(sizes) and sizes.max() > _WIDE * sizes.min():
+    if name.startswith("amplitude") and len(sizes) and sizes.max() > 30.0 * sizes.min():
         axes.set_yscale("log")
-        floor = _BELOW * float(sizes.min())
+        floor = 0.4 * float(sizes.min())  # there steady sliding stands, as 0 has no place on such an axis
     kinds = [branch.kind for branch in branches]
     for number, branch in enumerate(branches):
         colour = style.DARK if branch.slides else _COLOURS[(number - 1) % len(_COLOURS)]
@@ -154,7 +145,7 @@ def _number(group: str) -> int:
     return int(digits) if digits.isdigit() else 0
 
 
-def _with_ends(columns: dict[str, Any], marks: dict[str, Any]) -> dict[str, Any]:
+def _with_ends(columns: style.Columns, marks: style.Columns) -> style.Columns:
     """A branch with the special points between its motions at which it gains or loses its stability."""
     values = columns["value"]
     at = np.asarray(marks["value"], float)
@@ -168,13 +159,13 @@ def _with_ends(columns: dict[str, Any], marks: dict[str, Any]) -> dict[str, Any]
     return columns
 
 
-def _line(axes: Axes, columns: dict[str, Any], name: str, colour: str) -> None:
+def _line(axes: Axes, columns: style.Columns, name: str, colour: str) -> None:
     """One quantity of a branch: full between stable motions, dashed elsewhere."""
     stable = columns["stable"].astype(bool)
     for full, stretch in groupby(range(len(stable) - 1), lambda index: bool(stable[index : index + 2].all())):
         inside = [*stretch]
         inside.append(inside[-1] + 1)
-        look: dict[str, Any] = {"ls": "-", "lw": 1.8} if full else {"ls": style.DASHES, "lw": 1.2}
+        look: style.Look = {"ls": "-", "lw": 1.8} if full else {"ls": style.DASHES, "lw": 1.2}
         axes.plot(columns["value"][inside], columns[name][inside], color=colour, **look)
 
 
@@ -182,7 +173,8 @@ def _thin_marks(axes: Axes) -> None:
     """Leave one of several marks of a kind, and of a branch, that would lie on each other."""
     axes.get_xlim(), axes.get_ylim()  # so that they are those of all that is drawn
     figure = axes.get_figure(root=True)
-    apart = _APART * _SIZE / 72.0 * figure.get_dpi() if figure else 0.0
+    # by one and a half widths of a mark two of one kind are told apart; a choice
+    apart = 1.5 * _SIZE / 72.0 * figure.get_dpi() if figure else 0.0
     drawn = list[tuple[object, float, float]]()
     for line in [marker for marker in axes.get_lines() if marker.get_marker() not in ("None", "")]:
         ((x, y),) = axes.transData.transform(line.get_xydata())
@@ -193,11 +185,11 @@ def _thin_marks(axes: Axes) -> None:
             drawn.append((kind, x, y))
 
 
-def _marks(axes: Axes, marks: dict[str, Any], name: str, colour: str, floor: float) -> None:
+def _marks(axes: Axes, marks: style.Columns, name: str, colour: str, floor: float) -> None:
     """The special points, where they have this number."""
     if name not in marks:
         return
     for kind, value, height in zip(marks["kind"], marks["value"], marks[name], strict=True):
         if (marker := _MARKERS.get(str(kind))) and np.isfinite(height) and (name != "frequency" or height > 0.0):
-            look: dict[str, Any] = {"marker": marker, "ms": _SIZE, "mfc": "white", "ls": "none", "zorder": 3.0}
+            look: style.Look = {"marker": marker, "ms": _SIZE, "mfc": "white", "ls": "none", "zorder": 3.0}
             axes.plot([float(value)], [max(float(height), floor)], color=colour, label=str(kind), **look)

@@ -13,14 +13,9 @@ from brakecli.results.read import StoredResult
 from brakecli.views.plots import style
 from brakecli.views.plots.run import case_of
 
-Columns = dict[str, style.Array]  # over the entries; errors that cannot be drawn are NaN
 LARGEST = 3.0  # entries with larger errors are useless as results; they are not drawn
 _TEXTS = ("method", "scheme", "theta", "start", "iteration", "evaluator", "failure")
 _NUMBERS = ("step", "tolerance", "error", "wall_seconds", "contact_evaluations", "on_front")
-_PANELS = (  # column, factor, title and label of the work
-    ("wall_seconds", 1e3, "Work–precision", "median time of the loop (ms)"),
-    ("contact_evaluations", 1.0, "Work counted, the same on every machine", "evaluations of the contact force"),
-)
 _OTHERS = "other methods"
 _COLOURS = (style.BLUE, style.VERMILION, style.ORANGE, "#CC79A7", "#56B4E9", style.DARK)
 _MARKERS = "osD^vP*"  # of named methods, in turn: of another length than the colours
@@ -45,10 +40,16 @@ def draw(result: StoredResult) -> Figure:
     columns["error"] = np.where(drawn, columns["error"], np.nan)
     of_case = _method_of_case(columns, result)
     named = _named(columns, best, target, of_case)
-    rows = _PANELS if np.isfinite(columns["wall_seconds"]).any() else _PANELS[1:]
-    figure = style.headed(12.4, 6.6, heading, *lines, columns=len(rows), wspace=0.04)
-    panels = style.panels(figure, 1, len(rows), sharey=True)[0]
-    for axes, (name, factor, title, label) in zip(panels, rows, strict=True):
+    counted = "Work counted, the same on every machine"
+    works = {  # factor, title and label
+        "wall_seconds": (1e3, "Work–precision", "median time of the loop (ms)"),
+        "contact_evaluations": (1.0, counted, "evaluations of the contact force"),
+    }
+    if not np.isfinite(columns["wall_seconds"]).any():
+        del works["wall_seconds"]
+    figure = style.headed(12.4, 6.6, heading, *lines, columns=len(works), wspace=0.04)
+    panels = style.panels(figure, 1, len(works), sharey=True)[0]
+    for axes, (name, (factor, title, label)) in zip(panels, works.items(), strict=True):
         work = np.where(drawn & (columns[name] > 0.0), factor * columns[name], np.nan)
         _draw_errors(axes, columns, work, named, of_case)
         if target > 0.0:
@@ -56,7 +57,7 @@ def draw(result: StoredResult) -> Figure:
                 target, color=style.GREEN, ls=style.DASHES, lw=1.3, zorder=1.0, label=f"target {target:g}"
             )
         if best is not None and math.isfinite(columns[name][best]):
-            ring: dict[str, Any] = {"ms": 16.0, "mfc": "none", "mec": style.GREEN, "mew": 2.2, "zorder": 4.0}
+            ring: style.Look = {"ms": 16.0, "mfc": "none", "mec": style.GREEN, "mew": 2.2, "zorder": 4.0}
             axes.plot(factor * columns[name][best], errors[best], "o", label="recommended", **ring)
         (_draw_front if name == "wall_seconds" else _draw_slopes)(axes, columns, work)
         axes.set(title=title, xlabel=label)
@@ -73,17 +74,22 @@ def draw(result: StoredResult) -> Figure:
         panels[0].set_ylim(low, 2.5 * float(np.nanmax(columns["error"])))
         panels[0].yaxis.set_major_locator(LogLocator(numticks=20))
         for axes in panels if floor > low else ():
-            band: dict[str, Any] = {"color": style.GREY, "alpha": 0.2, "lw": 0, "zorder": 0.5}
-            axes.axhspan(low, floor, label="within the reference's error", **band)
+            words = "within the reference's error"
+            axes.axhspan(low, floor, label=words, color=style.GREY, alpha=0.2, lw=0, zorder=0.5)
     artists = style.labels(figure.axes)
     artists = {**{name: artist for name, artist in artists.items() if name != _OTHERS}, **artists}
-    look: dict[str, Any] = {"frameon": False, "handlelength": 2.6, "labelspacing": 0.6}
-    look["loc"] = "outside lower left" if style.is_narrow() else "outside right center"
-    figure.legend(artists.values(), artists.keys(), **look)
+    figure.legend(
+        artists.values(),
+        artists.keys(),
+        loc="outside lower left" if style.is_narrow() else "outside right center",
+        frameon=False,
+        handlelength=2.6,
+        labelspacing=0.6,
+    )
     return figure
 
 
-def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tuple[str, str]:
+def _lines(attributes: dict[str, Any], columns: style.Columns, best: int | None) -> tuple[str, str]:
     target = f"{attributes.get('target_error', 0.0):g}"
     first = f"no entry has an error of at most {target}"
     if best is not None:
@@ -100,7 +106,7 @@ def _lines(attributes: dict[str, Any], columns: Columns, best: int | None) -> tu
     return first, "   ·   ".join(parts + [f"{words} {count}" for words, count in counts.items() if count])
 
 
-def _named(columns: Columns, best: int | None, target: float, of_case: str) -> list[str]:
+def _named(columns: style.Columns, best: int | None, target: float, of_case: str) -> list[str]:
     """The methods that have a name in the picture: what the case asks for, what is recommended, and the front.
 
     Of the front those that meet the target, or all where none does.
@@ -113,7 +119,7 @@ def _named(columns: Columns, best: int | None, target: float, of_case: str) -> l
     return [*dict.fromkeys([*([of_case] if of_case else []), *named])]
 
 
-def _method_of_case(columns: Columns, result: StoredResult) -> str:
+def _method_of_case(columns: style.Columns, result: StoredResult) -> str:
     """The method that the case itself asks for, on the usual contact; empty where it is none of them."""
     solver = case_of(result).case.solver
     theta = ", ".join(f"{weight:.6g}" for weight in solver.theta or ())
@@ -122,14 +128,14 @@ def _method_of_case(columns: Columns, result: StoredResult) -> str:
     return str(columns["method"][same][0]) if same.any() else ""
 
 
-def _draw_errors(axes: Axes, columns: Columns, work: style.Array, named: list[str], of_case: str) -> None:
+def _draw_errors(axes: Axes, columns: style.Columns, work: style.Array, named: list[str], of_case: str) -> None:
     """The error of every method over its work, in the order of the file; those without a name are grey."""
     axes.set(xscale="log", yscale="log")
     for method in dict.fromkeys(columns["method"].tolist()):
         places = columns["method"] == method
         if np.isnan(work[places]).all():
             continue
-        look: dict[str, Any] = {"color": "#CFCFCF", "marker": ".", "lw": 0.9, "zorder": 1.5, "label": _OTHERS}
+        look: style.Look = {"color": "#CFCFCF", "marker": ".", "lw": 0.9, "zorder": 1.5, "label": _OTHERS}
         if method in named:
             number = named.index(method)
             colour = _COLOURS[number % len(_COLOURS)]
@@ -144,23 +150,31 @@ def _draw_errors(axes: Axes, columns: Columns, work: style.Array, named: list[st
         axes.plot(work[places], columns["error"][places], **look)
 
 
-def _draw_front(axes: Axes, columns: Columns, work: style.Array) -> None:
+def _draw_front(axes: Axes, columns: style.Columns, work: style.Array) -> None:
     """The entries that no other beats in both error and time."""
     by_work = np.argsort(work, kind="stable")  # NaN at the end
     on = by_work[columns["on_front"][by_work] == 1]
-    look: dict[str, Any] = {"color": style.GREEN, "alpha": 0.25, "lw": 8.0, "solid_capstyle": "round"}
-    axes.plot(work[on], columns["error"][on], zorder=0.9, label="no other is better in both", **look)
+    look: style.Look = {"color": style.GREEN, "lw": 8.0, "solid_capstyle": "round", "zorder": 0.9}
+    axes.plot(work[on], columns["error"][on], alpha=0.25, label="no other is better in both", **look)
 
 
-def _draw_slopes(axes: Axes, columns: Columns, work: style.Array) -> None:
+def _draw_slopes(axes: Axes, columns: style.Columns, work: style.Array) -> None:
     """How errors fall with the work at orders one and two, from the coarsest steps on."""
     stepped = np.isfinite(columns["step"]) & np.isfinite(work)
     if not stepped.any():
         return
     ends = np.array([work[stepped].min(), work[stepped].max()])
     top = 1.5 * float(columns["error"][stepped].max())
-    note: dict[str, Any] = {"xytext": (4, 0), "textcoords": "offset points", "va": "center", "size": 8.5}
+
     for order in (1, 2):
         errors = top * (ends / ends[0]) ** -order
         axes.plot(ends, errors, color="#777777", lw=0.9, ls=(0, (1, 2)), zorder=0.8)
-        axes.annotate(f"order {order}", (ends[1], errors[1]), color="#555555", **note)
+        axes.annotate(
+            f"order {order}",
+            (ends[1], errors[1]),
+            xytext=(4, 0),
+            textcoords="offset points",
+            va="center",
+            size=8.5,
+            color="#555555",
+        )

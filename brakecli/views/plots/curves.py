@@ -2,7 +2,6 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,7 +12,6 @@ from brakecli.studies.sweeps.windows import Outcome
 from brakecli.views.plots import style, sweep
 from brakecli.views.plots.sweep import Sign, SweepPicture
 
-_FAINT = 30.0  # times as large as the least amplitude on a logarithmic axis is the least of what lasts
 _DIRECTIONS = {"": ("", "-"), "up": (">", "-"), "down": ("<", style.DASHES)}  # marker and dashes of curves
 
 
@@ -61,8 +59,8 @@ def _draw_critical(axes: Axes, picture: SweepPicture) -> None:
     low = picture["critical_windows_lower"][0]
     high = picture["critical_windows_upper"][0]
     if (high < critical.upper).any():  # otherwise all is unstable above the critical value
-        bars: dict[str, Any] = {"color": style.BLUE, "alpha": 0.2, "lw": 1.2 * size, "zorder": 0.8}
-        axes.vlines(np.repeat(x, low.shape[1]), low.ravel(), high.ravel(), label="unstable", **bars)
+        bars = np.repeat(x, low.shape[1]), low.ravel(), high.ravel()
+        axes.vlines(*bars, label="unstable", color=style.BLUE, alpha=0.2, lw=1.2 * size, zorder=0.8)
     if (apart := picture.differs()[0]).any():
         axes.vlines(x[apart], sustained[apart], value[apart], color=style.VERMILION, lw=1.0, ls=style.DOTS)
         label = "vibration lasts from here on, from the case's own start"
@@ -114,7 +112,8 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
     factor, unit = style.prefixed(style.largest(values), unit)
     lasting, _, wide = picture.lasting_amplitudes()
     wide = wide and name == "amplitude"  # drawn on a logarithmic axis
-    least = max(lasting / _FAINT, float(values[values > 0.0].min())) if wide else 0.0
+    # that is drawn: the least of what lasts is at most 30 times as large
+    least = max(lasting / 30.0, float(values[values > 0.0].min())) if wide else 0.0
     x = axis.values
     size = sweep.size_of(len(axis.values))
     small = values < least
@@ -126,11 +125,11 @@ def _draw_motion(axes: Axes, picture: SweepPicture, name: str) -> None:
         y = factor * np.where(small[number], np.nan, values[number])
         arrow, dashes = _DIRECTIONS[direction]
         if axis.texts is None:
-            arrows: dict[str, Any] = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
+            arrows: style.Look = {"marker": arrow, "mfc": "white", "mec": style.DARK, "ms": size}
             label = f"on the way {direction}" if direction else None
             axes.plot(x, y, color="#777777", lw=1.0, ls=dashes, label=label, **arrows)
         for order, (chosen, label, colour, marker) in enumerate(picture.kinds):
-            points: dict[str, Any] = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
+            points: style.Look = {"ls": "none", "mfc": colour, "mec": style.DARK, "mew": 0.6}
             axes.plot(x[chosen[number]], y[chosen[number]], marker=arrow or marker, ms=size, **points)
             if (chosen & (~died | bool(picture.attractors))).any() and order < sweep.MOST_NAMED:  # for the legend
                 axes.plot([], [], marker="s" if direction else marker, ms=7, label=label, **points)
@@ -199,9 +198,17 @@ def _bars(axes: Axes, x: style.Array, value: style.Array, error: style.Array, si
     low, high = axes.get_ylim()
     height = 72.0 * axes.get_window_extent().height / axes.figure.dpi
     visible = error * height > 0.5 * size * (high - low)
-    look: dict[str, Any] = {"fmt": "none", "ecolor": style.BLUE, "capsize": 0.6 * size, "elinewidth": 1.0}
     if visible.any():
-        axes.errorbar(x[visible], value[visible], error[visible], label="error bar", **look)
+        axes.errorbar(
+            x[visible],
+            value[visible],
+            error[visible],
+            label="error bar",
+            fmt="none",
+            ecolor=style.BLUE,
+            capsize=0.6 * size,
+            elinewidth=1.0,
+        )
     if hidden := style.largest(error[~visible & np.isfinite(value)]):
         axes.plot(
             [], [], "|", color=style.BLUE, label=f"errors up to {style.readable(hidden, 2)} lie within the dots"

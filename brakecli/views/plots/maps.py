@@ -2,12 +2,12 @@
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import ListedColormap, LogNorm, Normalize
+from matplotlib.colors import Colormap, ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
@@ -17,21 +17,7 @@ from brakecli.studies.sweeps.record import Status
 from brakecli.views.plots import style, sweep
 from brakecli.views.plots.sweep import Sign, SweepPicture
 
-_LONG_TITLE = 34  # characters of a panel's title from which on it takes two lines
-# inches, of a figure with two columns of maps, and of each of more maps
-_MAP_WIDTH = 10.4
-_PANEL_WIDTH = 3.0
-# cells with a number, and how wide they must be (inches)
-_MOST_NUMBERS = 80
-_LEAST_CELL = 0.5
-_CONTOURED = 0.3  # part of the cells whose corners are known, from which on lines are drawn instead of numbers
-_DARK = 0.6  # part of the colours, from the dark end on, on which numbers are white
 _EMPTY = "#F7F7F7"  # of cells without a value
-# relative difference from which on numbers have different colours
-_ALIKE = 1e-6
-_CRITICAL_ALIKE = 1e-2
-_DOT = 8.0  # points (1/72 inch) across, of a listed point
-_MOST_DRAWN = 4096  # cells up to which each cell of a map is a shape of its own in a PDF or SVG file
 
 
 class Scale(NamedTuple):
@@ -55,13 +41,14 @@ def draw(picture: SweepPicture) -> Figure:
     layers = {"" if critical else shown.replace("_", " ").capitalize(): draw_shown}
     starts = {"Attractor": _draw_attractors} if picture.attractors else {"Regime": _draw_regimes}
     layers = layers if critical else {**starts, **layers}
+    two_maps = 10.4  # inches
     if sliced:
         pieces = slices(picture)
-        width = max(_MAP_WIDTH, 1.2 + _PANEL_WIDTH * len(pieces))
+        width = max(two_maps, 1.2 + 3.0 * len(pieces))
         height = 4.6 if critical else 7.2
     else:
         pieces = [(f" on the way {way}" if way else "", picture.towards(way)) for way in picture.directions]
-        width, height = (sweep.WIDTH, 5.8) if critical else (_MAP_WIDTH, 1.0 + 3.9 * len(pieces))
+        width, height = (sweep.WIDTH, 5.8) if critical else (two_maps, 1.0 + 3.9 * len(pieces))
     shape = (len(layers), len(pieces)) if sliced else (len(pieces), len(layers))
     figure = picture.figure(width, height, shape[1])
     panels = style.panels(figure, *shape, sharex=True, sharey=True)
@@ -92,7 +79,8 @@ def slices(picture: SweepPicture) -> list[tuple[str, SweepPicture]]:
     short = [number for number in range(3) if lengths[number] <= sweep.MOST_PANELS]
     sliced = min(short, key=lambda number: (picture.axes[number].texts is None, lengths[number], -number))
     pieces = [(picture.axes[sliced].named(index), picture.at(sliced, index)) for index in range(lengths[sliced])]
-    return [(name if len(name) < _LONG_TITLE else name.replace(" = ", "\n= "), piece) for name, piece in pieces]
+    # a title of more letters takes two lines
+    return [(name if len(name) < 34 else name.replace(" = ", "\n= "), piece) for name, piece in pieces]
 
 
 def _amplitude_scale(picture: SweepPicture) -> Scale:
@@ -120,7 +108,8 @@ def _scale(picture: SweepPicture, name: str) -> Scale:
         words = f"critical {critical.parameter}"
         low, high = (low, high) if values.size else (critical.lower, critical.upper)
     largest = max(abs(low), abs(high))
-    if high - low <= (_CRITICAL_ALIKE if name == "critical" else _ALIKE) * largest:
+    alike = 1e-2 if name == "critical" else 1e-6
+    if high - low <= alike * largest:
         low = low - (0.01 * largest or 1.0)
         high = high + (0.01 * largest or 1.0)
     factor, unit = style.prefixed(largest, unit)
@@ -135,19 +124,23 @@ def _draw_regimes(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappable
             codes[where] = code
             axes.plot([], [], marker, ms=9, mfc=colour, mec="none", label=str(regime))
     colours = ListedColormap([colour for colour, _marker in sweep.REGIMES.values()])
-    shaken = {"marker": "o", "color": style.DARK, "mec": "white", "label": sweep.FORCED}
-    different = {"marker": "$≠$", "color": style.DARK, "label": sweep.DIFFERENT}
-    open_ = {"marker": "x", "color": style.DARK, "label": "_"}  # in grey its colour is that of relaxation
-    signs = [(picture["excitation"] == Excitation.FORCED, shaken), (picture["hysteresis"], different)]
-    signs += [(picture["regime"] == Regime.UNDECIDED, open_), picture.failed()]
-    look: dict[str, Any] = {"cmap": colours, "vmin": -0.5, "vmax": len(sweep.REGIMES) - 0.5}
-    mesh = _mesh(axes, picture, codes, *signs, **look)
+    shaken: style.Look = {"marker": "o", "color": style.DARK, "mec": "white", "label": sweep.FORCED}
+    different: style.Look = {"marker": "$≠$", "color": style.DARK, "label": sweep.DIFFERENT}
+    open_: style.Look = {"marker": "x", "color": style.DARK, "label": "_"}  # its grey is that of relaxation
+    signs = [
+        Sign(picture["excitation"] == Excitation.FORCED, shaken),
+        Sign(picture["hysteresis"], different),
+        Sign(picture["regime"] == Regime.UNDECIDED, open_),
+        picture.failed(),
+    ]
+    norm = Normalize(-0.5, len(sweep.REGIMES) - 0.5)
+    mesh = _mesh(axes, picture, codes, *signs, cmap=colours, norm=norm)
     x, y = (axis for axis, _ in picture.plane)
     if sweep.MARGIN in picture.variables and min(map(len, (x.values, y.values))) > 1 and not (x.texts or y.texts):
         margin = np.ma.masked_invalid(picture[sweep.MARGIN][0].T)
         if margin.min() < 0.0 < margin.max():
-            look = {"colors": "black", "linewidths": 1.8, "linestyles": [style.DASHES]}
-            axes.contour(x.values, y.values, margin, [0.0], **look)
+            lines = [style.DASHES]
+            axes.contour(x.values, y.values, margin, [0.0], colors="black", linewidths=1.8, linestyles=lines)
             axes.plot([], [], color="black", lw=1.8, ls=style.DASHES, label=sweep.CRITICAL_LINE)
     return mesh
 
@@ -159,12 +152,11 @@ def _draw_attractors(axes: Axes, picture: SweepPicture, _: Scale) -> ScalarMappa
     colours = ListedColormap(sweep.shades(count))
     for number, label in enumerate(picture.attractors[: sweep.MOST_NAMED]):
         axes.plot([], [], "s", ms=9, mfc=colours(number), mec="none", label=label)
-    open_ = {"marker": "x", "color": style.DARK, "label": sweep.UNKNOWN}
+    open_: style.Look = {"marker": "x", "color": style.DARK, "label": sweep.UNKNOWN}
     nothing = (numbers == 0) & (picture["status"] == Status.DONE)
     values = np.where(numbers > 0, numbers, np.nan)
-    return _mesh(
-        axes, picture, values, (nothing, open_), picture.failed(), cmap=colours, vmin=0.5, vmax=count + 0.5
-    )
+    norm = Normalize(0.5, count + 0.5)
+    return _mesh(axes, picture, values, Sign(nothing, open_), picture.failed(), cmap=colours, norm=norm)
 
 
 def _draw_numbers(axes: Axes, picture: SweepPicture, scale: Scale, name: str) -> ScalarMappable:
@@ -172,16 +164,16 @@ def _draw_numbers(axes: Axes, picture: SweepPicture, scale: Scale, name: str) ->
     values = np.where(died, np.nan, scale.factor * picture[name])
     if died.any():  # its cells are empty
         axes.plot([], [], "s", ms=9, mfc=_EMPTY, mec=style.GREY, label="damped: nothing lasts")
-    empty = {"marker": ".", "color": style.GREY, "label": "no value"}
+    empty: style.Look = {"marker": ".", "color": style.GREY, "label": "no value"}
     nothing = np.isnan(values) & ~died & (picture["status"] == Status.DONE)
-    return _mesh(axes, picture, values, (nothing, empty), picture.failed(), cmap="viridis", norm=scale.norm)
+    return _mesh(axes, picture, values, Sign(nothing, empty), picture.failed(), cmap="viridis", norm=scale.norm)
 
 
 def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMappable:
     """The critical value with contours, or with numbers where there are few; points without one are marked."""
     label = "vibration lasts elsewhere, from the case's own start"
-    elsewhere = {"marker": "d", "color": style.VERMILION, "mec": "white", "label": label}
-    signs = (picture.differs(), elsewhere), *picture.missing()
+    elsewhere: style.Look = {"marker": "d", "color": style.VERMILION, "mec": "white", "label": label}
+    signs = Sign(picture.differs(), elsewhere), *picture.missing()
     mesh = _mesh(axes, picture, scale.factor * picture["critical"], *signs, cmap="cividis", norm=scale.norm)
     if picture.listed:
         return mesh
@@ -189,21 +181,23 @@ def _draw_critical(axes: Axes, picture: SweepPicture, scale: Scale) -> ScalarMap
     finite = np.isfinite(values)
     areas = finite[1:, 1:] & finite[:-1, 1:] & finite[1:, :-1] & finite[:-1, :-1]
     numeric = all(axis.texts is None and len(axis.values) >= 3 for axis in picture.axes)
-    if numeric and np.mean(areas) > _CONTOURED:
+    if numeric and np.mean(areas) > 0.3:  # of the cells have known corners, so that lines say more than numbers
         _draw_contours(axes, picture, values, scale.norm)
         return mesh
     width = axes.get_window_extent().width / axes.figure.dpi
-    if values.size <= _MOST_NUMBERS and width > _LEAST_CELL * len(values):
+    if values.size <= 80 and width > 0.5 * len(values):  # inches, as a number is wide
         for i, j in np.argwhere(finite):
             x = picture.axes[0].values[i]
             y = picture.axes[1].values[j]
             value = values[i, j]
-            colour = "white" if scale.norm(value) < _DARK else "black"
+            colour = "white" if scale.norm(value) < 0.6 else "black"  # on the dark part of the colours
             axes.text(x, y, f"{value:.4g}", ha="center", va="center", size=8.0, color=colour)
     return mesh
 
 
-def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, **look: Any) -> ScalarMappable:
+def _mesh(
+    axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, cmap: str | Colormap, norm: Normalize
+) -> ScalarMappable:
     """A cell around each point, in the colour of its value, none where it is missing; with signs in the middle.
 
     Listed points fill no grid: each is a dot.
@@ -212,19 +206,22 @@ def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, 
     x.apply_to(axes.xaxis)
     y.apply_to(axes.yaxis)
     if picture.listed:
-        size = sweep.size_of(values.size, _DOT)
-        dots: dict[str, Any] = {"s": size**2, "linewidths": 0.6}
+        size = sweep.size_of(values.size, 8.0)
+        area = size**2
         drawn = np.ma.masked_invalid(values[0])
         none = np.ma.getmaskarray(drawn)
-        axes.scatter(across[none], up[none], fc=_EMPTY, ec=style.GREY, **dots)
-        mesh: ScalarMappable = axes.scatter(across, up, c=drawn, ec=style.DARK, **dots, **look)
+        axes.scatter(across[none], up[none], area, fc=_EMPTY, ec=style.GREY, linewidths=0.6)
+        mesh: ScalarMappable = axes.scatter(
+            across, up, area, drawn, cmap=cmap, norm=norm, ec=style.DARK, linewidths=0.6
+        )
         size *= 0.6
     else:
         axes.grid(False)
         axes.set_facecolor(_EMPTY)
         drawn = np.ma.masked_invalid(values[0].T)
         seams = {"edgecolors": "white", "linewidth": 0.4} if drawn.size <= 1000 else {"edgecolors": "face"}
-        mesh = axes.pcolormesh(x.edges, y.edges, drawn, **look, **seams, rasterized=drawn.size > _MOST_DRAWN)
+        many = drawn.size > 4096  # for shapes of their own in a PDF or SVG file
+        mesh = axes.pcolormesh(x.edges, y.edges, drawn, cmap=cmap, norm=norm, rasterized=many, **seams)
         axes.set(xlim=x.edges[[0, -1]], ylim=y.edges[[0, -1]])
         # signs are small where cells are
         box = axes.get_window_extent()
@@ -232,7 +229,8 @@ def _mesh(axes: Axes, picture: SweepPicture, values: style.Array, *signs: Sign, 
         size = float(np.clip(0.4 * min(box.width / len(x.values), box.height / len(y.values)) * scale, 1.0, 7.0))
     for where, sign in signs:
         if where.any():  # drawn above contours
-            axes.plot(across[where[0]], up[where[0]], **{"ls": "none", "ms": size, "zorder": 2.1, **sign})
+            look: style.Look = {"ls": "none", "ms": size, "zorder": 2.1, **sign}
+            axes.plot(across[where[0]], up[where[0]], **look)
     return mesh
 
 

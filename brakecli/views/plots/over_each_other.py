@@ -1,7 +1,6 @@
 """Two or three results of one kind, their curves over each other."""
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -15,10 +14,7 @@ from brakecli.views.plots.lock_in import FEW
 from brakecli.views.plots.quantities import VARIABLES, scaled
 from brakecli.views.plots.run import FAINTEST, HARMONICS, RunPicture
 
-# inches; of an envelope
-_WIDTH = 9.4
-_COLUMNS = 100
-_LOOKS: tuple[dict[str, Any], ...] = (  # the wide line is seen behind the thin ones, also in grey
+_LOOKS: tuple[style.Look, ...] = (  # the wide line is seen behind the thin ones, also in grey
     {"color": "#7DB9DE", "lw": 3.2, "ls": "-"},
     {"color": style.VERMILION, "lw": 1.2, "ls": style.DASHES},
     {"color": style.DARK, "lw": 1.3, "ls": style.DOTS},
@@ -44,11 +40,13 @@ def draw(
     return _curves(results, kind, variable, names, in_a_row)
 
 
-def _panels(count: int, height: float, title: str, lines: Sequence[str], in_a_row: bool) -> tuple[Figure, Any]:
+def _panels(
+    count: int, height: float, title: str, lines: Sequence[str], in_a_row: bool
+) -> tuple[Figure, style.Array]:
     """A figure with so many panels in a row, or below each other, each so high (inches)."""
     columns = count if in_a_row else 1
     rows = 1 if in_a_row else count
-    width = _WIDTH * (1.3 if in_a_row else 1.0)
+    width = 9.4 * (1.3 if in_a_row else 1.0)
     figure = style.headed(width, 0.3 + height * rows, title, *lines, columns=columns, hspace=0.06)
     return figure, style.panels(figure, rows, columns).ravel()
 
@@ -100,10 +98,10 @@ def _runs(results: Sequence[StoredResult], variable: str, names: Sequence[str], 
 
 
 def _wider(picture: RunPicture) -> list[style.Array]:
-    """An envelope of fewer columns, so that each holds a cycle or more; the last one reaches to the end."""
+    """An envelope of a hundred columns, so that each holds a cycle or more; the last one reaches to the end."""
     time, lowest, highest = picture.envelope
     end = picture.span[1]
-    first = np.arange(0, len(time), max(1, len(time) // _COLUMNS))
+    first = np.arange(0, len(time), max(1, len(time) // 100))
     low = np.minimum.reduceat(lowest, first)
     high = np.maximum.reduceat(highest, first)
     return [np.append(time[first], end), np.append(low, low[-1]), np.append(high, high[-1])]

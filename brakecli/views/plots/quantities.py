@@ -17,8 +17,6 @@ VARIABLES = {  # what `--variable` may name: words, words at the axis with the s
     "torque": ("braking torque", "braking torque $R F_x$", "$R F_x$", "N m"),
     "contact_fraction": ("part of the pad that touches", "touching part of the pad", "the touching part", ""),
 }
-CENTRED = 0.02  # of the middle of values: if they move by less, the axis counts from a centre
-STILL = 1e-6  # of the whole run's motion: a smaller one is drawn as a line
 
 
 @dataclass(frozen=True)
@@ -41,7 +39,7 @@ def scaled(variable: str, values: style.Array, whole: style.Array, also: float =
     _, name, _, unit = VARIABLES[variable]
     largest = max(style.largest(whole), also)
     moves = float(np.ptp(values))
-    if moves <= max(STILL * float(np.ptp(whole)), style.ROUNDING * largest):
+    if moves <= max(1e-6 * float(np.ptp(whole)), style.ROUNDING * largest):  # too little for more than a line
         middle = float(np.median(values))
         half = 0.05 * largest or 1.0
         factor, unit = style.prefixed(abs(middle) + half, unit)
@@ -58,7 +56,7 @@ def _centre(values: style.Array) -> float:
     """What to subtract from values that differ too little for readable ticks, in round numbers; otherwise 0."""
     middle = 0.5 * float(values.min() + values.max())
     width = float(np.ptp(values))
-    if not 0.0 < width < CENTRED * abs(middle):
+    if not 0.0 < width < 0.02 * abs(middle):
         return 0.0
     digits = math.ceil(math.log10(abs(middle) / width))
     return float(f"{middle:.{digits}e}")

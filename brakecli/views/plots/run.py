@@ -30,19 +30,15 @@ from brakecli.views.plots.stop import Stop, draw_amplitude, draw_spectrogram
 from brakecli.views.render import TERMINAL
 
 CYCLES = 12  # drawn in detail
-MOST_WORK = 5.0  # of finding steady sliding for the frequencies of its modes
 MOST_DETAIL = 100_000  # samples drawn one by one
 FEW = 4000  # samples of the detail where no frequency says how long a cycle is
 COLUMNS = 1200  # columns of the envelope: about the width of its panel in pixels
-FEW_LINES = 5  # waves of the wheel that have a line each in the spectrum; more have a tick each
-FLATTENS = 4.0  # times the velocity of the shoe: a wheel that is faster is not drawn beside it
 # times its line, and times a wave or the last frequency that shows, a spectrum reaches
 HARMONICS = 6.5
 ROOM = 1.3
 FAINTEST = 1e-10  # of the largest density: what is below shows rounding
-SPARSE = 40  # samples, of which each has a dot
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
-_BELT: dict[str, Any] = {"color": style.VERMILION, "ls": style.DASHES}
+_BELT: style.Look = {"color": style.VERMILION, "ls": style.DASHES}
 
 
 class RunPicture:
@@ -83,9 +79,8 @@ class RunPicture:
         fastest = style.largest(self.detail["belt"])
         moving = style.largest(self.detail[self.ordinate])
         speed = fastest if self.ordinate == "vx" else 0.0
-        self.near = self.ordinate == "vx" and (
-            moving == 0.0 or fastest <= FLATTENS * moving
-        )  # U does not flatten it
+        # a wheel that is faster is not drawn beside the shoe, whose curve it would flatten
+        self.near = self.ordinate == "vx" and (moving == 0.0 or fastest <= 4.0 * moving)
         ends = {name: np.array(bounds[1:]) for name, bounds in wholes.items()}
         self.axes = {
             name: scaled(name, self.detail[name], ends[name], speed * (name == "vx" and self.near))
@@ -117,7 +112,7 @@ def case_of(result: StoredResult) -> LoadedCase:
 
 def _mode_frequencies(system: System) -> list[float]:
     """Frequencies (Hz) of the modes of steady sliding, as far as they turn; none where they would take long."""
-    if stability_work(system) + table_work(system) > MOST_WORK:
+    if stability_work(system) + table_work(system) > 5.0:  # seconds, or as many more as a machine is slower
         return []
     c = system.coefficients
     equilibrium = sliding(system)
@@ -208,11 +203,11 @@ def draw(picture: RunPicture) -> Figure:
         factor, unit = style.prefixed(style.largest(belt), "m/s")
         size = f"= {factor * belt[-1]:.4g}" if np.ptp(belt) == 0.0 else f"up to {factor * style.largest(belt):.4g}"
         axes.set_title(f"U {size} {unit}, off the scale", loc="right", size=8.5, color=style.VERMILION)
-    spans: tuple[Any, ...] = (picture.detail["time"], picture.span, picture.span)
-    for axes, time in zip(panels[:, 0], spans, strict=False):
-        style.set_ticks(axes.xaxis, float(time[0]), float(time[-1]), "s", "time")
-        if time[-1] > time[0]:
-            axes.set_xlim(time[0], time[-1])
+    start, end = map(float, picture.detail["time"][[0, -1]])
+    for axes, (first, last) in zip(panels[:, 0], ((start, end), picture.span, picture.span), strict=False):
+        style.set_ticks(axes.xaxis, first, last, "s", "time")
+        if last > first:
+            axes.set_xlim(first, last)
         if axes in panels[:2, 0] and axes.get_legend_handles_labels()[1]:  # which gets room above the data
             style.make_room(axes)
             axes.legend(loc="upper right", ncols=3)
@@ -225,12 +220,14 @@ def _draw_detail(axes: Axes, picture: RunPicture) -> None:
     interval = picture.interval
     look_of = picture.axes[picture.variable]
     axes.plot(time, look_of(picture.detail[picture.variable]), color=style.BLUE, marker=_marker(time))
-    look: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "alpha": 0.3, "lw": 0, "zorder": 0.5}
+    whole_height = axes.get_xaxis_transform()
     for state, colour, label in _SHADES:
         stretches = episodes(picture.detail["state"], state)
         spans = [(time[first] - 0.5 * interval, (last - first + 1) * interval) for first, last in stretches]
         if spans:
-            axes.broken_barh(spans, (0, 1), color=colour, label=label, **look)
+            axes.broken_barh(
+                spans, (0, 1), transform=whole_height, color=colour, alpha=0.3, lw=0, zorder=0.5, label=label
+            )
     if picture.near and picture.variable == "vx":
         label = f"U = {look_of.factor * belt[-1]:.4g} {look_of.unit}" if np.ptp(belt) == 0.0 else "U"
         axes.plot(time, look_of(belt), lw=1.1, label=label, **_BELT)
@@ -291,7 +288,7 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
         axes.text(0.5, 0.5, words, transform=axes.transAxes, ha="center", color="#666666")
         return
     kind, line = picture.line
-    few = picture.passing if len(picture.passing) <= FEW_LINES else ()
+    few = picture.passing if len(picture.passing) <= 5 else ()  # a line each; more have a tick each
     highest = min(frequency[-1], max([HARMONICS * (line or np.inf), *(ROOM * f for f in few)]))
     near = shown & (frequency <= highest)
     near = near if near.any() else shown
@@ -305,9 +302,10 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     for number, wave in enumerate(few):
         axes.axvline(wave, lw=0.9, zorder=0.8, label="" if number else "waves of the wheel pass", **_BELT)
     if picture.passing and not few:
-        ticks: dict[str, Any] = {"transform": axes.get_xaxis_transform(), "ls": "none", "marker": "|", "ms": 14.0}
-        label = f"{len(picture.passing)} waves of the wheel pass"
-        axes.plot(picture.passing, 0.0 * np.array(picture.passing), color=style.VERMILION, label=label, **ticks)
+        ticks: style.Look = {"color": style.VERMILION, "ls": "none", "marker": "|", "ms": 14.0}
+        ticks["label"] = f"{len(picture.passing)} waves of the wheel pass"
+        bottom = 0.0 * np.array(picture.passing)
+        axes.plot(picture.passing, bottom, transform=axes.get_xaxis_transform(), **ticks)
     if line:
         error = f" ± {picture.resolution:.2g}" if picture.resolution and kind != "fundamental" else ""
         label = f"{kind} {line:.4g}{error} Hz"
@@ -324,4 +322,4 @@ def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
 
 
 def _marker(values: style.Array) -> str:
-    return "." if len(values) < SPARSE else ""  # a line alone would not show so few samples
+    return "." if len(values) < 40 else ""  # a line alone would not show so few samples

@@ -11,11 +11,6 @@ from brakecli.results.stability_fields import PROBABLE
 from brakecli.views.plots import style
 from brakecli.views.plots.run import case_of
 
-# inches; of a bar; bins of a histogram, at most
-_WIDTH = 9.6
-_ROW = 0.36
-_BINS = 40
-_LONG = 22  # characters of a line of a name
 CRITICAL = "critical_friction"
 _SQUEALS = style.VERMILION
 _OTHERS = style.BLUE
@@ -31,10 +26,10 @@ def draw(result: StoredResult) -> Figure:
     indexed = "total" in variables and "parameter" in variables
     columns = _columns(result)
     attributes = result.attributes
-    rows = max(len(outcomes), 3)
+    bars = 0.36 * max(len(outcomes), 3)  # inches
     lines = (str(attributes.get(name, "")) for name in ("title", "sentence"))
-    figure = style.headed(_WIDTH, 1.6 + _ROW * rows + 2.4, *lines, columns=2)
-    upper, lower = style.panels(figure, 2, 2, height_ratios=[0.5 + _ROW * rows, 2.6])
+    figure = style.headed(9.6, 1.6 + bars + 2.4, *lines, columns=2)
+    upper, lower = style.panels(figure, 2, 2, height_ratios=[0.5 + bars, 2.6])
     _probabilities(upper[0], outcomes, *shares)
     if indexed:
         _tornado(upper[1], result, str(attributes.get("indices_of", "")))
@@ -79,7 +74,7 @@ def _probabilities(axes: Axes, names: list[str], value: style.Array, low: style.
     colours = [_SQUEALS if name == "squeal" else _OTHERS for name in names]
     off = np.clip(np.array([value - low, high - value]), 0.0, None)
     axes.barh(places, value, height=0.62, color=colours, xerr=off, error_kw={"ecolor": style.DARK, "capsize": 3.0})
-    texts = [textwrap.fill(PROBABLE.get(name, name), _LONG) for name in names]
+    texts = [textwrap.fill(PROBABLE.get(name, name), 22) for name in names]
     axes.set_yticks(places, labels=texts, parse_math=False)
     axes.set_xlim(0.0, min(1.0, 1.1 * float(high.max())) or 1.0)
     axes.xaxis.set_major_formatter(lambda share, _: f"{100.0 * share:.3g} %")
@@ -120,7 +115,7 @@ def _histogram(axes: Axes, shown: dict[str, style.Array], name: str, units: str,
         low, high = np.quantile(values, (0.005, 0.995))
         inside[label] = values[(values >= low) & (values <= high)]
     every = np.concatenate([*inside.values()])
-    count = min(_BINS, 5 + int(max(map(len, inside.values())) ** 0.5))
+    count = min(40, 5 + int(max(map(len, inside.values())) ** 0.5))
     edges = np.histogram_bin_edges(every, count).tolist()
     for (label, values), colour in zip(shown.items(), (_OTHERS, style.ORANGE), strict=False):
         middle = float(np.median(values))

@@ -20,11 +20,8 @@ from brakecli.views.render import TERMINAL
 
 MOST = 200_000  # samples whose time is drawn, the last ones
 WAVE = "wave"
-KINDS = ("stick", "slip", "turn", "lift-off", "touch")
-_WITH_THE_WHEEL = KINDS[:3]  # where vx is the wheel's speed
-_FEWEST = 8  # samples in a period between which a state is certain
-_SPREAD = 0.01  # of the motion: dots that spread further fill the axes; others are one dot on the motion
-_ROOM = 0.54  # of the spread of the dots, to each side of their middle
+_WITH_THE_WHEEL = ("stick", "slip", "turn")  # where vx is the wheel's speed
+KINDS = (*_WITH_THE_WHEEL, "lift-off", "touch")
 _STATE = ("x", "y", "vx", "vy")
 _Points = dict[str, style.Array]
 
@@ -54,9 +51,10 @@ def draw(result: StoredResult, section: str) -> Figure:
     lines = f"Poincaré section {where}   ·   {count}", verdict
     figure = style.headed(10.4, 4.81, title, *lines, columns=2, wspace=0.05)
     pairs = (("x", "y"), ("x", "vy")) if section in _WITH_THE_WHEEL else (("x", "vx"), ("y", "vy"))
+    wide = 0.01  # of the motion: dots that spread further fill the axes; others are one dot on the motion
     spreads = {name: (float(np.ptp(points[name])), float(np.ptp(last[name]))) for name in _STATE}
     for axes, pair in zip(style.panels(figure, 1, 2).flat, pairs, strict=True):
-        near = any(spread > _SPREAD * whole for spread, whole in map(spreads.__getitem__, pair))
+        near = any(spread > wide * whole for spread, whole in map(spreads.__getitem__, pair))
         shown = points if near else last
         looks = [scaled(name, shown[name], np.r_[last[name], points[name]]) for name in pair]
         motion, dots = (
@@ -69,7 +67,7 @@ def draw(result: StoredResult, section: str) -> Figure:
             if near:
                 spread, whole = spreads[name]
                 middle = 0.5 * float(values.min() + values.max())
-                half = look.factor * max(_ROOM * spread, 0.5 * _SPREAD * whole)
+                half = look.factor * max(0.54 * spread, 0.5 * wide * whole)
                 limit(middle - half, middle + half)
     return figure
 
@@ -90,11 +88,11 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
     wave = np.argmin(np.abs(passing - forced)) if forced else np.argmax(np.abs(system.wheel.g))
     frequency = float(passing[wave])
     start, end, interval = time
-    if frequency * interval > 1.0 / _FEWEST:
+    fewest = 8  # samples in a period between which a state is certain
+    if frequency * interval > 1.0 / fewest:
         what = f"samples every {interval:.3g} s do not resolve the wave of {frequency:.4g} Hz"
         raise UsageError(
-            f"{argument('section')} {WAVE}: {what}; "
-            f"run with output.sample_interval={1.0 / frequency / _FEWEST:.2g}"
+            f"{argument('section')} {WAVE}: {what}; run with output.sample_interval={1.0 / frequency / fewest:.2g}"
         )
     times = np.arange(math.ceil(begin * frequency), math.floor(end * frequency) + 1) / frequency
     if not len(times):

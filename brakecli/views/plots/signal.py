@@ -18,8 +18,6 @@ _VELOCITY = {
     Measurand.TORQUE: ("rate of the torque", "N m/s"),
     Measurand.PRESSURE: ("pressure", "Pa"),
 }
-FAINT = 1e-6  # of the largest density: what is fainter adds nothing to the axis of a burst
-_LABELLED = 4  # bursts whose frequency is written into the record
 
 
 def draw(look: SignalLook, source: str) -> Figure:
@@ -55,7 +53,7 @@ def _draw_record(axes: Axes, look: SignalLook) -> None:
         axes.plot(step * np.arange(len(values)), factor * values, color=style.BLUE, lw=0.9)
     for i, tone in enumerate(sorted(look.verdict.bursts, key=lambda tone: -tone.level)):
         axes.axvspan(tone.start, tone.end, color=style.ORANGE, alpha=0.25, lw=0, zorder=0.5)
-        if i < _LABELLED:
+        if i < 4:  # the loudest
             centre = 0.5 * (tone.start + tone.end)
             where = axes.get_xaxis_transform()
             axes.text(centre, 1.0, f"{tone.frequency:.4g} Hz", transform=where, ha="center", va="bottom", size=8)
@@ -138,7 +136,7 @@ def _draw_spectrum(axes: Axes, look: SignalLook) -> None:
     low, high = (float(frequencies[shown][i]) for i in (0, -1)) if shown.any() else (1.0, 1.0)
     if burst:
         low = 0.0
-        loud = frequencies[density > FAINT * style.largest(density)]
+        loud = frequencies[density > 1e-6 * style.largest(density)]  # what is fainter adds nothing to the axis
         high = min(high, max(ROOM * float(loud.max(initial=0.0)), 2.0 * burst.frequency))
         axes.set_xlim(low, high)
     style.set_ticks(axes.xaxis, low, high, "Hz", "frequency")

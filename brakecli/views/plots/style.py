@@ -3,14 +3,15 @@
 import math
 import textwrap
 import warnings
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from io import BytesIO
 from itertools import pairwise
-from typing import Any
+from typing import Any, TypedDict
 
 import matplotlib.style
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis, XAxis, YAxis
 from matplotlib.figure import Figure
@@ -24,6 +25,7 @@ from brakecli.results.write import FILL
 from brakecli.views.render import prefixed as prefixed
 
 Array = NDArray[Any]
+Columns = dict[str, Array]  # by the names of the result
 
 # The colours of Okabe and Ito, which people who do not see red or green can tell apart.
 BLUE = "#0072B2"
@@ -37,22 +39,24 @@ DASHES: tuple[int, tuple[float, ...]] = 0, (5, 3)  # offset, and lengths on and 
 DOTS: tuple[int, tuple[float, ...]] = 0, (1, 1.5)
 ROUNDING = 1e-12  # relative difference below which numbers of a computation are the same
 WIDE = 300.0  # ratio of the ends of a logarithmic axis from which on only powers of ten have a number
-_ALIKE = 0.02  # values whose relative difference is smaller do not fill the axis from bottom to top
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_LOOK: tuple[tuple[str, dict[str, Any]], ...] = (
-    ("font", {"size": 9.5}),
-    ("axes", {"titlesize": 10.5, "titlelocation": "left", "titlepad": 8.0}),
-    ("axes", {"edgecolor": "#555555", "labelcolor": "#222222", "grid": True, "axisbelow": True}),
-    ("axes.spines", {"top": False, "right": False}),
-    ("axes.formatter", {"useoffset": False, "use_mathtext": False}),  # a formula takes 5 ms, a text nothing
-    ("grid", {"color": "#E4E4E4", "linewidth": 0.7}),
-    ("xtick", {"color": "#444444"}),
-    ("ytick", {"color": "#444444"}),
-    ("lines", {"linewidth": 1.2}),
-    ("legend", {"framealpha": 0.85, "edgecolor": "none", "fontsize": 8.5, "handlelength": 1.6}),
-    ("svg", {"hashsalt": "brakecli"}),  # the same picture gives the same bytes
-)
 _UNDATED = {".pdf": {"CreationDate": None}, ".svg": {"Date": None}}
+
+
+class Look(TypedDict, total=False):
+    """How a line with its markers is drawn, by Matplotlib's short names."""
+
+    color: str
+    ls: str | tuple[int, tuple[float, ...]]
+    lw: float
+    solid_capstyle: str
+    marker: str | None
+    ms: float
+    mfc: str
+    mec: str
+    mew: float
+    label: str | None
+    zorder: float
 
 
 @contextmanager
@@ -62,7 +66,30 @@ def applied(narrow: bool = False, titled: bool = True) -> Iterator[None]:
     Figures that are `narrow` have a single column of panels, for a small screen. Those of a page, which has the
     title itself, are not `titled`.
     """
-    look = {f"{group}.{key}": value for group, values in _LOOK for key, value in values.items()}
+    look: dict[str, object] = {
+        "font.size": 9.5,
+        "axes.titlesize": 10.5,
+        "axes.titlelocation": "left",
+        "axes.titlepad": 8.0,
+        "axes.edgecolor": "#555555",
+        "axes.labelcolor": "#222222",
+        "axes.grid": True,
+        "axes.axisbelow": True,
+        "axes.spines.top": False,
+        "axes.spines.right": False,
+        "axes.formatter.useoffset": False,
+        "axes.formatter.use_mathtext": False,  # a formula takes 5 ms, a text nothing
+        "grid.color": "#E4E4E4",
+        "grid.linewidth": 0.7,
+        "xtick.color": "#444444",
+        "ytick.color": "#444444",
+        "lines.linewidth": 1.2,
+        "legend.framealpha": 0.85,
+        "legend.edgecolor": "none",
+        "legend.fontsize": 8.5,
+        "legend.handlelength": 1.6,
+        "svg.hashsalt": "brakecli",  # the same picture gives the same bytes
+    }
     look |= {"figure.figsize": (NARROW, NARROW)} if narrow else {}
     look |= {} if titled else {"figure.titlesize": 0.0}
     with matplotlib.style.context(["default", look]), warnings.catch_warnings():
@@ -126,19 +153,36 @@ def is_narrow() -> bool:
     return bool(matplotlib.rcParams["figure.figsize"][0] == NARROW)
 
 
-def panels(figure: Figure, rows: int, columns: int, **options: Any) -> Array:
+def panels(
+    figure: Figure,
+    rows: int,
+    columns: int,
+    *,
+    width_ratios: Sequence[float] | None = None,
+    height_ratios: Sequence[float] | None = None,
+    sharex: bool = False,
+    sharey: bool = False,
+) -> Array:
     """Panels in rows and columns; in a narrow figure all below each other, but in an array of this shape."""
+    shape = rows, columns
     if is_narrow():
-        options.pop("width_ratios", None)
-        if heights := options.get("height_ratios"):
-            options["height_ratios"] = np.repeat(heights, columns)
-        return np.asarray(figure.subplots(rows * columns, 1, squeeze=False, **options)).reshape(rows, columns)
-    return np.asarray(figure.subplots(rows, columns, squeeze=False, **options))
+        shape = rows * columns, 1
+        width_ratios = None
+        height_ratios = height_ratios and np.repeat(height_ratios, columns).tolist()
+    axes = figure.subplots(
+        *shape,
+        sharex=sharex,
+        sharey=sharey,
+        squeeze=False,
+        width_ratios=width_ratios,
+        height_ratios=height_ratios,
+    )
+    return np.asarray(axes).reshape(rows, columns)
 
 
-def labels(panels: Iterable[Axes]) -> dict[str, Any]:
+def labels(panels: Iterable[Axes]) -> dict[str, Artist]:
     """What panels label, each label once, with the artist that has it."""
-    artists: dict[str, Any] = {}
+    artists: dict[str, Artist] = {}
     for axes in panels:
         for artist, label in zip(*axes.get_legend_handles_labels(), strict=True):
             artists.setdefault(label, artist)
@@ -194,7 +238,7 @@ def density(values: Array, frequency: Array, unit: str) -> tuple[float, str]:
     return factor**2, f"power spectral density ({squared}/Hz)"
 
 
-def unit_of(attributes: Mapping[str, Any]) -> str:
+def unit_of(attributes: Mapping[str, object]) -> str:
     """The unit of a variable; none where it is "1". A dollar sign, with which formulas begin, is left out."""
     units = str(attributes.get("units", "")).replace("$", "")
     return "" if units == "1" else units
@@ -224,9 +268,10 @@ def widen(axes: Axes, values: Array) -> None:
     """Fit the axis to the values, and keep those that differ too little in its middle."""
     low = np.nanmin(values)
     high = np.nanmax(values)
-    if high - low < _ALIKE * abs(high + low) / 2.0:
+    alike = 0.02  # values whose relative difference is smaller do not fill the axis from bottom to top
+    if high - low < alike * abs(high + low) / 2.0:
         middle = 0.5 * (high + low)
-        half = 0.25 * _ALIKE * abs(high + low)
+        half = 0.25 * alike * abs(high + low)
         axes.set_ylim(middle - half, middle + half)
     else:
         room = 0.08 * (high - low)

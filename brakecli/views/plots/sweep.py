@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib import colormaps
@@ -28,7 +28,6 @@ FORCED = "forced by the wheel's waves"
 DIFFERENT = "up and down differ"
 CRITICAL_LINE = "critical friction"
 UNKNOWN = "no attractor known"
-_FEW = 60  # points up to which each has a marker of full size
 MOST_NAMED = 12  # attractors in the legend: the first of them
 _FORMS = "osD^vPh*<>"  # markers of attractors, in turn
 WIDTH = 8.8  # inches, of a figure with one column of panels
@@ -36,9 +35,13 @@ MOST_PANELS = 5  # values of a third axis: its maps stand side by side
 FORCED_PART = "amplitude_forced"
 ATTRACTOR = "attractor"
 _FIRST = (*map(str, REGIMES), "by simulation", "critical value", "error bar", "by eigenvalues")  # in the legend
-_WIDE = 20.0  # ratio of lasting amplitudes from which on their scale is logarithmic
 
-Sign = tuple[style.Array, dict[str, Any]]  # points without a value that could be drawn, the look of their marker
+
+class Sign(NamedTuple):
+    """Points without a value that could be drawn, and the look of their marker."""
+
+    where: style.Array
+    look: style.Look
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ class SweepPicture:
         places = np.meshgrid(*(axis.values for axis in self.axes), indexing="ij")
         return tuple(zip(self.axes, places, strict=True))
 
-    def named(self, indices: Sequence[Any]) -> str:
+    def named(self, indices: Sequence[np.intp]) -> str:
         """The keys of a point with their values, by its place along each axis."""
         if self.listed:
             at = [(axis, int(np.searchsorted(axis.values, along[indices[0]]))) for axis, along in self.listed]
@@ -133,7 +136,7 @@ class SweepPicture:
         sustained = np.isin(self["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
         amplitude = self["amplitude"][sustained & (self["amplitude"] > 0.0)]
         least, largest = (float(amplitude.min()), float(amplitude.max())) if amplitude.size else (0.0, 0.0)
-        return least, largest, largest > _WIDE * least
+        return least, largest, largest > 20.0 * least
 
     def differs(self) -> style.Array:
         """Where the least sustained value lies outside the bracket of the critical one, or where there is none."""
@@ -177,12 +180,12 @@ class SweepPicture:
 
 def sign(where: style.Array, label: str, marker: str, colour: str, face: str) -> Sign:
     """A sign for points without a value; a triangle that points up stands at the top of curves."""
-    return where, {"ls": "none", "label": label, "marker": marker, "mec": colour, "mfc": face, "mew": 1.2}
+    return Sign(where, {"ls": "none", "label": label, "marker": marker, "mec": colour, "mfc": face, "mew": 1.2})
 
 
 def size_of(points: int, largest: float = 6.5) -> float:
-    """The size of markers (1/72 inch), smaller where there are many points."""
-    return float(max(2.0, largest * min(1.0, _FEW / points) ** 0.5))
+    """The size of markers (1/72 inch), smaller where there are more than 60 points."""
+    return float(max(2.0, largest * min(1.0, 60 / points) ** 0.5))
 
 
 def shades(count: int) -> style.Array:
@@ -204,8 +207,17 @@ def add_legend(figure: Figure) -> None:
     engine = figure.get_layout_engine()
     assert isinstance(engine, ConstrainedLayoutEngine)
     x, y, wide, high = engine.get()["rect"]
-    look: dict[str, Any] = {"frameon": False, "borderaxespad": 0.0, "borderpad": 0.0, "columnspacing": 1.6}
-    look |= {"loc": "upper left", "bbox_to_anchor": (0.125 / width, y + high), "ncols": columns}
-    figure.legend([artists[text] for text in texts], texts, **look).set_in_layout(False)
+    legend = figure.legend(
+        [artists[text] for text in texts],
+        texts,
+        loc="upper left",
+        bbox_to_anchor=(0.125 / width, y + high),
+        ncols=columns,
+        frameon=False,
+        borderaxespad=0.0,
+        borderpad=0.0,
+        columnspacing=1.6,
+    )
+    legend.set_in_layout(False)
     taken = (0.19 * -(-len(texts) // columns) + 0.09) / height
     engine.set(rect=(x, y, wide, high - taken))
