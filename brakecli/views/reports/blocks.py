@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BytesIO
 from itertools import groupby
-from typing import Any
+from typing import SupportsFloat
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -20,15 +20,12 @@ from brakecli.views.render import Renderer
 from brakecli.views.view import Row, View, sentences
 from brakecli.views.view import Table as Columns
 
-Numbers = Mapping[str, tuple[Any, str]]
+Numbers = Mapping[str, tuple[object, str]]
 """What results are compared by: values with their units, by their names."""
 
 Shares = tuple[float, float, float]
 """Part of the brakes that squeal, and both ends of its 95 % interval."""
 
-# of a picture: a third of the bytes, and no difference that could be seen
-_COLOURS = 255
-_DPI = 120
 PER_CENT = "%"
 _PARTS = ("margin", "squeal_probability")  # besides parts of the time
 
@@ -75,11 +72,45 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class Side:
+    """An axis of a map: the edges of its cells and the names of their values, in short for ticks."""
+
+    label: str
+    edges: list[float]
+    values: list[str]
+    short: list[str]
+
+    @property
+    def ticks(self) -> list[tuple[float, str]]:
+        """Places of ticks, seven at most, and what stands there."""
+        step = -(-len(self.values) // 7)
+        middles = [0.5 * (low + high) for low, high in zip(self.edges, self.edges[1:], strict=False)]
+        return list(zip(middles, self.short, strict=True))[::step]
+
+
+@dataclass(frozen=True)
+class Map:
+    """Cells in rows and columns; `data` is what the page's script reads."""
+
+    title: str
+    x: Side
+    y: Side
+    cells: list[tuple[str, str]]  # colour and path of all cells that have it
+    letters: list[tuple[float, float, str]]
+    legend: list[tuple[str, str]]
+    data: Mapping[str, object]
+    kind = "map"
+
+
+Block = Table | Texts | Code | Picture | Map
+
+
+@dataclass(frozen=True)
 class Section:
     """A headline with what stands below it."""
 
     title: str
-    blocks: Sequence[Any]
+    blocks: Sequence[Block]
 
 
 @dataclass(frozen=True)
@@ -91,7 +122,7 @@ class Part:
     question: str
     answer: Sequence[str]
     picture: Picture | None
-    change: Sequence[Any]  # blocks that say what to change
+    change: Sequence[Block]  # what to change
     sections: Callable[[], Sequence[Section]]
     numbers: Numbers
     versions: Mapping[str, str] = field(default_factory=dict)
@@ -107,7 +138,7 @@ class Beside:
     best: str  # a sentence; empty where nothing tells one from the other
     names: Sequence[str]
     titles: Sequence[str]  # of their own pages
-    changed: Sequence[Any]  # blocks
+    changed: Sequence[Block]
     numbers: Table
     pictures: Sequence[Picture]
 
@@ -117,15 +148,16 @@ def picture(words: str, draw: Callable[[], Figure]) -> Picture:
     images = []
     for narrow in (False, True):
         with style.applied(narrow, titled=False):
-            png = Image.open(BytesIO(style.rendered(draw(), ".png", _DPI))).convert("RGB")
+            png = Image.open(BytesIO(style.rendered(draw(), ".png", dpi=120))).convert("RGB")
         stream = BytesIO()
-        few = png.quantize(_COLOURS, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)  # rare colours, too
+        # a third of the bytes, and no difference that could be seen; rare colours are among them
+        few = png.quantize(255, Image.Quantize.MAXCOVERAGE, dither=Image.Dither.NONE)
         few.save(stream, "png", optimize=True)
         images.append("data:image/png;base64," + base64.b64encode(stream.getvalue()).decode())
     return Picture(words, images[0], images[1])
 
 
-def _prefixed(value: Any, unit: str) -> str:
+def _prefixed(value: SupportsFloat, unit: str) -> str:
     if isinstance(value, int | np.integer) and not unit:
         return f"{int(value):,}".replace(",", "\u202f").replace("-", "−")
     factor, unit = style.prefixed(abs(float(value)), unit)
@@ -137,9 +169,9 @@ PAGE = Renderer(_prefixed, "–", most=8, units_each=True)
 shown = PAGE.text
 
 
-def blocks_of(view: View) -> list[Any]:
+def blocks_of(view: View) -> list[Block]:
     """The numbers and tables of a view, as a page writes them."""
-    pieces = list[Any]()
+    pieces = list[Block]()
     for kind, blocks in groupby(view.blocks, type):
         if kind is Row:
             pieces.append(Table([(row.label, row.text) for row in blocks if isinstance(row, Row)]))
@@ -156,7 +188,7 @@ def percent(fraction: float) -> str:
     return f"{100.0 * fraction:+.3g}\u00a0%".replace("-", "−")
 
 
-def rounded(value: Any, digits: int) -> Any:
+def rounded(value: object, digits: int) -> object:
     """A number to so many digits; anything else as it is."""
     return float(f"{value:.{digits}g}") if isinstance(value, float) else value
 
@@ -168,7 +200,7 @@ def key_unit(key: str) -> str:
     return ""
 
 
-def numbers_of(fields: Iterable[Field], values: Mapping[str, Any]) -> Numbers:
+def numbers_of(fields: Iterable[Field], values: Mapping[str, object]) -> Numbers:
     """The values of some fields, None where there is none; parts are in per cent, as in sentences."""
     return {item.title: _number(item, values.get(item.name)) for item in fields}
 
@@ -178,6 +210,7 @@ def share(fraction: float | None) -> tuple[float | None, str]:
     return None if fraction is None else 100.0 * fraction, PER_CENT
 
 
-def _number(item: Field, value: Any) -> tuple[Any, str]:
-    is_part = item.is_part_of_time or item.name in _PARTS
-    return share(value) if is_part else (value, item.units)
+def _number(item: Field, value: object) -> tuple[object, str]:
+    if item.is_part_of_time or item.name in _PARTS:
+        return share(float(value) if isinstance(value, SupportsFloat) else None)
+    return value, item.units

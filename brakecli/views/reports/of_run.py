@@ -4,7 +4,6 @@ import math
 import shlex
 from collections.abc import Iterable, Iterator
 from functools import partial
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -32,6 +31,7 @@ from brakecli.views.plots.result import draw
 from brakecli.views.plots.run import case_of
 from brakecli.views.reports.blocks import (
     PAGE,
+    Block,
     Code,
     Part,
     Section,
@@ -50,15 +50,8 @@ from brakecli.views.view import View, sentences
 
 QUESTION = "Will this shoe vibrate, in which way, at which frequency, and what should be changed?"
 PICTURE = "The motion in detail, its phase portrait, the whole history, and the spectrum of the velocity"
-MARGIN = 0.2  # of the friction, that advice aims at
-# up to which that reaches: critical or own friction, and own friction at most
-BEYOND = 1.5
-MOST_BEYOND = 4.0
-VALUES = 121  # of the friction in the lock-in diagram
-# keys on the first page
-MOST_CHANGES = 5
+MOST_CHANGES = 5  # keys on the first page
 MOST_WORK = 60.0  # of asking all, as `runs.work` counts it
-DIGITS = 4  # of an interval of vibration
 _IDLE = ("initial.", "solver.", "output.")  # keys that stand below the others
 _MAIN = (
     *("regime", "excitation", "frequency", "amplitude", "stick_fraction", "contact_loss_fraction"),
@@ -74,7 +67,8 @@ def part_of_run(result: StoredResult, progress: Counted) -> Part:
     """What the page says of a run. Raises UnreadableResultError."""
     attributes = result.attributes
     loaded = case_of(result)
-    advice = under_tolerance(advise(loaded, KEYS, MARGIN, progress, most=MOST_WORK), loaded.case)
+    margin = 0.2  # of the friction, that advice aims at
+    advice = under_tolerance(advise(loaded, KEYS, margin, progress, most=MOST_WORK), loaded.case)
     theory = f"By theory, of small vibration and by eigenvalues: {advice.conclusion()}."
     answer = [motion_sentence(stored_numbers(result), PAGE, full=True), theory]
     name = escaped(result.path.name)
@@ -108,7 +102,7 @@ def _appendix(result: StoredResult, loaded: LoadedCase, advice: AdviceReport) ->
     ]
 
 
-def _to_change(advice: AdviceReport, regime: Any) -> Iterator[Any]:
+def _to_change(advice: AdviceReport, regime: object) -> Iterator[Block]:
     """The changes that help most, and what the advice rests on."""
     helpful = [change for change in advice.advice if change.to is not None]
     lines = []
@@ -145,7 +139,7 @@ def _target(change: Change) -> str:
     return shown(value, unit(change.parameter)) + relative
 
 
-def case_blocks(loaded: LoadedCase) -> list[Any]:
+def case_blocks(loaded: LoadedCase) -> list[Block]:
     """Every key of a case with its value and unit, and the text to copy."""
     keys = {key: value for key, value in flat(loaded.case.model_dump(mode="json")) if value not in (None, [])}
     del keys["title"]
@@ -156,14 +150,14 @@ def case_blocks(loaded: LoadedCase) -> list[Any]:
     return [shoe, Table(idle, head, "Start, solver and output"), Code(loaded.resolved, "The whole case as a file")]
 
 
-def repeat(result: StoredResult, again: str, source: str) -> list[Any]:
+def repeat(result: StoredResult, again: str, source: str) -> list[Block]:
     """The commands that give the result, and this page, again; and the file that it was computed from."""
     report = f"brakecli report {escaped(shlex.quote(result.path.name))} --full -o report.html"
     exactly = "The same version on the same machine gives the same numbers, to the last bit."
     return [Code(f"{again}\n{report}"), Texts([exactly]), Code(source, "The file as it was given")]
 
 
-def _stability(advice: AdviceReport) -> Iterator[Any]:
+def _stability(advice: AdviceReport) -> Iterator[Block]:
     report = advice.stability
     numbers = values_of(STABILITY, report) | values_of(THRESHOLDS, advice.thresholds)
     view = of_stability(numbers, "", PAGE)
@@ -179,13 +173,12 @@ def _stability(advice: AdviceReport) -> Iterator[Any]:
 
 
 def _diagram(advice: AdviceReport) -> Figure:
-    """Modes over the friction coefficient, to half more than what matters."""
+    """Modes over friction, to half more than the case's or the critical one; to four times the case's at most."""
     report = advice.stability
     c = advice.system.coefficients
-    highest = BEYOND * max(report.friction, advice.critical_friction or 0.0) or 1.0
-    if highest > MOST_BEYOND * report.friction > 0.0:
-        highest = MOST_BEYOND * report.friction
-    phi = np.linspace(0.0, highest, VALUES)
+    highest = 1.5 * max(report.friction, advice.critical_friction or 0.0) or 1.0
+    highest = min(highest, 4.0 * report.friction or highest)
+    phi = np.linspace(0.0, highest, 121)
 
     def at(friction: float) -> tuple[Mode, ...]:
         k = report.stiffness_at(friction)
@@ -203,7 +196,7 @@ def _diagram(advice: AdviceReport) -> Figure:
     return figure
 
 
-def _regime(result: StoredResult) -> list[Any]:
+def _regime(result: StoredResult) -> list[Block]:
     attributes = result.attributes
     rows = PAGE.rows((field for field in fields.VERDICT if field.kind != fields.OBJECT), attributes)
     evidence = result.group_attributes("regime/evidence")
@@ -214,7 +207,7 @@ def _regime(result: StoredResult) -> list[Any]:
     reasons = Texts(sentences(reasons_of(attributes, PAGE)))
     intervals = stored_numbers(result).get("vibrations") or []
     vibrations = [
-        [shown(rounded(interval[field.name], DIGITS), field.units) for field in fields.VIBRATION]
+        [shown(rounded(interval[field.name], 4), field.units) for field in fields.VIBRATION]
         for interval in intervals
     ]
     beats = [Table(vibrations, [field.meaning for field in fields.VIBRATION])]
@@ -222,7 +215,7 @@ def _regime(result: StoredResult) -> list[Any]:
     return [reasons, *beats * bool(intervals), Table(rows), shown_on_demand]
 
 
-def _accuracy(result: StoredResult) -> list[Any]:
+def _accuracy(result: StoredResult) -> list[Block]:
     error = abs(float(result.group_attributes("energy").get("relative_closing_error", math.nan)))
     closing = "energy account", f"{error:.1e}", "what it does not account for, over its largest item"
     return [Table([*PAGE.rows(named(fields.RUN, *_ACCURACY), result.attributes), closing])]

@@ -4,7 +4,7 @@ import math
 import textwrap
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 from brakecli.errors import UsageError
 from brakecli.results.contents import keys
@@ -15,6 +15,7 @@ from brakecli.views.plots import over_each_other
 from brakecli.views.reports.blocks import (
     PER_CENT,
     Beside,
+    Block,
     Part,
     Shares,
     Table,
@@ -29,20 +30,20 @@ from brakecli.views.view import sentence
 
 PICTURE = "All results in one picture: the first one wide, the second one dashed"
 THIRD = ", the third one dotted"
-# to which numbers are compared; increase above which there is no per cent
-DIGITS = 4
-_OF_CHANGE = 3
-MOST_PART = 10.0
-# rows of both tables on a single page, and letters of the keys that are left out
-_MOST_KEYS = 5
-_MOST_NUMBERS = 9
-_MOST_LETTERS = 180
-_NARROW = 2  # results whose picture stands beside their numbers, and not below them
-_NAMED = 2  # changed keys by which the results are named
+DIGITS = 4  # to which numbers are compared
+_MOST_KEYS = 5  # on a single page
 _CHOSEN = "solver.duration", "output.sample_interval"  # by the program, where a file gives no numbers
 _SAME = "same"
 _ABOUT = "key", "parameter"  # of the tables of a study and of a sweep
 _IN_ITS_UNIT = "low", "high", "mean", "mode", "deviation", "start", "stop", "values"
+
+
+class _Row(NamedTuple):
+    """The values that all results have under one name."""
+
+    name: str
+    values: Sequence[object]
+    unit: str
 
 
 def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -> Beside | None:
@@ -54,7 +55,7 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         return None
     sources = [keys(result, ("case_toml",)) for result in results]
     fixed = [name for name in _CHOSEN if any(isinstance(source.get(name), int | float) for source in sources)]
-    case = list[tuple[Any, ...]]()
+    case = list[_Row]()
     chosen = list[str]()
     every = [keys(result) for result in results]
     for name in dict.fromkeys(name for case_keys in every for name in case_keys):
@@ -65,37 +66,39 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
         if name in _CHOSEN and name not in fixed:
             chosen += [f"{name} ({', '.join(texts)})"] * (len({*texts}) > 1)
         elif name != "title" and {} not in values:  # which stands for a table without keys
-            label, units = _with_its_key(name, every)
-            case.append((label, *values, units))
-    units_of = {name: units for part in parts for name, (_, units) in part.numbers.items()}
+            label, unit = _with_its_key(name, every)
+            case.append(_Row(label, values, unit))
+    units = {name: unit for part in parts for name, (_, unit) in part.numbers.items()}
     numbers = []
-    for name, units in units_of.items():
+    for name, unit in units.items():
         values = [rounded(part.numbers.get(name, (None,))[0], DIGITS) for part in parts]
         if {*map(str, values)} - {"None", ""}:
-            numbers.append((name, *values, units))
-    single = [row for row in case if all(isinstance(value, str | int | float) for value in row[1:-1])][:_NAMED]
-    apart = [_changes(single, side) for side in range(1, len(parts) + 1)]
+            numbers.append(_Row(name, values, unit))
+    single = [row for row in case if all(isinstance(value, str | int | float) for value in row.values)]
+    single = single[:2]  # by which the results are named
+    apart = [_changes(single, side) for side in range(len(parts))]
     names = [", ".join(filter(None, pair)) for pair in zip((part.name for part in parts), apart, strict=True)]
     letters = "ABC"[: len(parts)]
     files = [f"{letter}: {part.name}" for letter, part in zip(letters, parts, strict=True)]
     try:
-        draw = partial(over_each_other.draw, results, "", files, in_a_row=len(parts) > _NARROW)
-        pictures = [picture(PICTURE + THIRD * (len(parts) > _NARROW), draw)]
+        three = len(parts) > 2  # of which the picture stands below their numbers, and not beside them
+        draw = partial(over_each_other.draw, results, "", files, in_a_row=three)
+        pictures = [picture(PICTURE + THIRD * three, draw)]
     except UsageError:  # no curves that could be drawn over each other
         pictures = [part.picture for part in parts if part.picture]
     titles = [part.title for part in parts]
     title = " – ".join(titles)
     if len({*titles}) == 1:
-        steps = [f"{name} {' → '.join(shown(v, units) for v in values)}" for name, *values, units in single]
+        steps = [f"{name} {' → '.join(shown(v, unit) for v in values)}" for name, values, unit in single]
         title = f"{titles[0]}: {', '.join(steps) or ' – '.join(names)}"
         titles = [", ".join(filter(None, pair)) for pair in zip(files, apart, strict=True)]
     head = ("", *letters, *(f"{letter} against A" for letter in letters[1:]))
     most = len(case) if full else _MOST_KEYS
-    blocks: list[Any] = [_table(case[:most], head) if case else Texts(["The cases are the same."])]
-    if more := ", ".join(name for name, *_ in case[most:]):
-        blocks.append(Texts([f"Different, too: {textwrap.shorten(more, _MOST_LETTERS, placeholder=' …')}."]))
-    if not full:  # what is the same is no news
-        numbers = [row for row in numbers if len({*map(str, row[1:-1])}) > 1][:_MOST_NUMBERS]
+    blocks: list[Block] = [_table(case[:most], head) if case else Texts(["The cases are the same."])]
+    if more := ", ".join(row.name for row in case[most:]):
+        blocks.append(Texts([f"Different, too: {textwrap.shorten(more, 180, placeholder=' …')}."]))
+    if not full:  # what is the same is no news, and more does not fit on a single page
+        numbers = [row for row in numbers if len({*map(str, row.values)}) > 1][:9]
     if chosen:
         blocks.append(Texts([f"Not given as numbers in the files, and different, too: {', '.join(chosen)}."]))
     advice = [part.advice for part in parts if part.advice]
@@ -106,21 +109,20 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
     return Beside(title, best, names, titles, blocks, _table(numbers, head), pictures)
 
 
-def _changes(rows: Sequence[tuple[Any, ...]], side: int) -> str:
+def _changes(rows: Sequence[_Row], side: int) -> str:
     """The changed keys of one result with their values; both ends of a range together."""
     said = list[str]()
-    for row, after in zip(rows, [*rows, ("",)][1:], strict=True):
-        value = shown(row[side], row[-1])
-        key, _, end = row[0].rpartition(", ")
-        if end == "low" and after[0] == f"{key}, high":
-            value = f"{shown(row[side])} … {shown(after[side], after[-1])}"
-            said.append(f"{key} {value}")
+    for row, after in zip(rows, [*rows[1:], None], strict=True):
+        value = shown(row.values[side], row.unit)
+        key, _, end = row.name.rpartition(", ")
+        if end == "low" and after and after.name == f"{key}, high":
+            said.append(f"{key} {shown(row.values[side])} … {shown(after.values[side], after.unit)}")
         elif end != "high" or not said or not said[-1].startswith(f"{key} "):
-            said.append(f"{row[0]} = {value}")
+            said.append(f"{row.name} = {value}")
     return ", ".join(said)
 
 
-def _with_its_key(name: str, every: Sequence[Mapping[str, Any]]) -> tuple[str, str]:
+def _with_its_key(name: str, every: Sequence[Mapping[str, object]]) -> tuple[str, str]:
     """A key of a sweep or a study by the key of the case that it is about, if that is the same, and its unit."""
     table, _, what = name.rpartition(".")
     places = [f"{table}.{key}" for key in _ABOUT]
@@ -183,30 +185,29 @@ def _times(advice: AdviceReport) -> float:
     return math.inf if advice.margin is None else float(f"{1.0 + advice.margin:.{DIGITS}g}")
 
 
-def _table(rows: Sequence[tuple[Any, ...]], head: Sequence[str]) -> Table:
-    """Name, all values, and by how much they differ from the first, of rows that end with the unit."""
-    cells = list[tuple[str, ...]]()
-    marked = list[int]()
-    for name, first, *others, units in rows:
-        changes = [_change(first, other, units) for other in others]
-        if {*changes} != {_SAME}:
-            marked.append(len(cells))
-        cells.append((name, *(shown(value, units) for value in (first, *others)), *changes))
+def _table(rows: Sequence[_Row], head: Sequence[str]) -> Table:
+    """Names, all values, and by how much they differ from the first."""
+    changes = [[_change(row.values[0], value, row.unit) for value in row.values[1:]] for row in rows]
+    marked = [number for number, of_row in enumerate(changes) if {*of_row} != {_SAME}]
+    cells = [
+        (row.name, *(shown(value, row.unit) for value in row.values), *of_row)
+        for row, of_row in zip(rows, changes, strict=True)
+    ]
     return Table(cells, head, marked=marked)
 
 
-def _change(a: Any, b: Any, units: str) -> str:
+def _change(a: object, b: object, unit: str) -> str:
     """What became of a number: by how much it changed, in per cent of what it was where that says more or less.
 
     A number below 0 has no per cent, and a part of a whole has its own: their difference is said, in points.
     """
     if a == b:
         return _SAME
-    if all(isinstance(value, int | float) and not isinstance(value, bool) for value in (a, b)):
-        if units == PER_CENT or min(a, b) < 0.0:
-            more = rounded(float(b - a), _OF_CHANGE)
-            sign = "+" if more > 0.0 else ""
-            return sign + shown(more, "points" if units == PER_CENT else units)
-        if a and b / a - 1.0 < MOST_PART:
-            return percent(b / a - 1.0)
-    return "differs"
+    if not isinstance(a, int | float) or not isinstance(b, int | float) or bool in (type(a), type(b)):
+        return "differs"
+    if unit == PER_CENT or min(a, b) < 0.0:
+        more = float(f"{float(b - a):.3g}")
+        sign = "+" if more > 0.0 else ""
+        return sign + shown(more, "points" if unit == PER_CENT else unit)
+    # an increase of many times says nothing in per cent
+    return percent(b / a - 1.0) if a and b / a - 1.0 < 10.0 else "differs"

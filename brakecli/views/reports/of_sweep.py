@@ -4,7 +4,6 @@ import shlex
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 
@@ -26,6 +25,7 @@ from brakecli.views.plots.sweep import SweepPicture
 from brakecli.views.points import of_comparison, regimes_sentence
 from brakecli.views.reports.blocks import (
     PAGE,
+    Block,
     Code,
     Numbers,
     Part,
@@ -45,7 +45,6 @@ from brakecli.views.reports.sweep_map import MOST, maps
 from brakecli.views.stability import of_branch, of_lock_in, of_scatter
 from brakecli.views.view import sentence
 
-MOST_FAILURES = 20
 _PROBABILITY = "probability", "probability_lower", "probability_upper"
 _TEXTS = ("regime", "excitation", "critical_status", "sustained_status", "reason")
 _ERRORS = ("estimated_error", "critical_error", "critical_bias", "unconverged_steps")
@@ -96,7 +95,7 @@ def part_of_sweep(result: StoredResult) -> Part:
 
 def _points(result: StoredResult, sweep_picture: SweepPicture, names: list[str]) -> list[Section]:
     """The points of a sweep with all their values, their errors and warnings."""
-    points: list[Any] = [*maps(sweep_picture, names)]
+    points: list[Block] = [*maps(sweep_picture, names)]
     if not points:
         points.append(Texts([f"Values of single points are left out above {MOST} of them; they are in the file."]))
     axes = [
@@ -114,8 +113,9 @@ def _points(result: StoredResult, sweep_picture: SweepPicture, names: list[str])
     failed = np.ravel(np.asarray(result.read("/", "status")) != Status.DONE)
     reasons = np.ravel(result.read("/", "reason"))
     warned = np.ravel(result.read("/", "warning"))
-    lines = [f"Failed: {reason}." for reason in dict.fromkeys(reasons[failed].tolist())][:MOST_FAILURES]
-    lines += [f"{warning}." for warning in dict.fromkeys(warned[warned != ""].tolist())][:MOST_FAILURES]
+    most = 20  # of each
+    lines = [f"Failed: {reason}." for reason in dict.fromkeys(reasons[failed].tolist())][:most]
+    lines += [f"{warning}." for warning in dict.fromkeys(warned[warned != ""].tolist())][:most]
     return [
         Section("Points and their values", [grid, *points]),
         Section("Accuracy", [table]),
@@ -135,7 +135,7 @@ def _answer(sweep_picture: SweepPicture) -> tuple[list[str], Numbers]:
         end = np.nanargmin
     size = done.size
     values = sweep_picture[name]
-    numbers: dict[str, tuple[Any, str]] = {"points": (size, "1")}
+    numbers: dict[str, tuple[object, str]] = {"points": (size, "1")}
     if sweep_picture.critical is None:
         lasting = np.isin(sweep_picture["regime"], (Regime.RELAXATION, Regime.QUASI_HARMONIC))
         kinds, counts = np.unique(sweep_picture["regime"][done], return_counts=True)
@@ -245,7 +245,7 @@ def _unit_of_key(result: StoredResult) -> str:
 def _range(result: StoredResult, kind: str) -> str:
     """The key, or keys, along which a result was computed, with both ends, as an option of its command."""
     key = str(result.attributes.get("parameter", ""))
-    ends = list[Any]()
+    ends = list[object]()
     if kind == "branch":
         ends = [result.attributes.get(name, 0.0) for name in ("lower", "upper")]
     if kind == "stability":
@@ -284,7 +284,7 @@ def _plain(
     name = escaped(result.path.name)
     asks = question or _QUESTIONS[kind]
     what = "This names the keys of such a case to change, and to which values:"
-    change = list[Any]()
+    change = list[Block]()
     if kind in _ADVISE:
         advise = _ADVISE[kind].replace("CASE.toml", case_file or "CASE.toml")
         change = [Texts([what]), Code(advise)]

@@ -1,9 +1,7 @@
 """The map of a sweep on a page: cells in colour, and the values of each point for pointer and keyboard."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 from matplotlib import colormaps
@@ -14,49 +12,12 @@ from brakecli.views.plots import style
 from brakecli.views.plots.axis import Axis
 from brakecli.views.plots.maps import slices
 from brakecli.views.plots.sweep import REGIMES, SweepPicture
-from brakecli.views.reports.blocks import shown
+from brakecli.views.reports.blocks import Map, Side, shown
 
 MOST = 10_000  # points whose values are on the page
 _WORDY = 2000  # up to here with the reasons, and with five digits
-# of the cells, in units of the drawing; a row alone is lower
-WIDTH = 400.0
-HEIGHT = 260.0
-_TICKS = 7
-_SHADES = 32
 _NONE = "#f2f2f2"
 _LETTERS = {Regime.RELAXATION: "R", Regime.QUASI_HARMONIC: "Q", Regime.UNDECIDED: "?"}  # colours are alike in grey
-_LEAST_LETTER = 11.0  # of a cell that holds a letter
-
-
-@dataclass(frozen=True)
-class Side:
-    """An axis of the map: the edges of its cells and the names of their values, in short for ticks."""
-
-    label: str
-    edges: list[float]
-    values: list[str]
-    short: list[str]
-
-    @property
-    def ticks(self) -> list[tuple[float, str]]:
-        """Places of ticks and what stands there."""
-        step = -(-len(self.values) // _TICKS)
-        middles = [0.5 * (low + high) for low, high in zip(self.edges, self.edges[1:], strict=False)]
-        return list(zip(middles, self.short, strict=True))[::step]
-
-
-@dataclass(frozen=True)
-class Map:
-    """Cells in rows and columns; `data` is what the page's script reads."""
-
-    title: str
-    x: Side
-    y: Side
-    cells: list[tuple[str, str]]  # colour and path of all cells that have it
-    letters: list[tuple[float, float, str]]
-    legend: list[tuple[str, str]]
-    data: dict[str, Any]
-    kind = "map"
 
 
 def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
@@ -71,9 +32,9 @@ def maps(picture: SweepPicture, names: list[str]) -> Iterator[Map]:
 
 
 def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
-    x = _side(picture.axes[0], WIDTH)
+    x = _side(picture.axes[0], 400.0)
     flat = len(picture.axes) == 1
-    y = Side("", [0.0, 40.0], [""], [""]) if flat else _side(picture.axes[1], HEIGHT, upwards=True)
+    y = Side("", [0.0, 40.0], [""], [""]) if flat else _side(picture.axes[1], 260.0, upwards=True)
     shape = len(x.values), len(y.values)
     colours, legend = _colours(picture)
     cells: dict[str, list[str]] = {}
@@ -86,15 +47,15 @@ def _map(picture: SweepPicture, names: list[str], title: str) -> Map:
         cell = f"M{x_low:.4g} {low:.4g}H{x_high:.4g}V{high:.4g}H{x_low:.4g}z"
         cells.setdefault(colours.reshape(shape)[i, j], []).append(cell)
         letter = _LETTERS.get(picture["regime"].reshape(shape)[i, j], "") if picture.critical is None else ""
-        if letter and x_high - x_low > _LEAST_LETTER < high - low:
+        if letter and min(x_high - x_low, high - low) > 11.0:  # so that it holds a letter
             letters.append((0.5 * (x_low + x_high), 0.5 * (low + high) + 4.0, letter))
     columns = {}
     for name in names:
         values = picture[name].reshape(shape)
         unit = picture.units.get(name, "")
         columns[name.replace("_", " ")] = _numbers(values, unit) if values.dtype.kind in "iuf" else _texts(values)
-    data = {"x": x.edges, "y": y.edges, "xs": x.values, "ys": y.values, "names": [x.label, y.label]}
-    data["columns"] = columns
+    names_of_axes = [x.label, y.label]
+    data = {"x": x.edges, "y": y.edges, "xs": x.values, "ys": y.values, "names": names_of_axes, "columns": columns}
     return Map(title, x, y, [(colour, "".join(paths)) for colour, paths in cells.items()], letters, legend, data)
 
 
@@ -122,14 +83,15 @@ def _colours(picture: SweepPicture) -> tuple[style.Array, list[tuple[str, str]]]
     shades = colormaps["cividis"]
     there = values[np.isfinite(values)]
     low, high = (float(there.min()), float(there.max())) if there.size else (0.0, 1.0)
-    level = np.round(np.nan_to_num((values - low) / ((high - low) or 1.0)) * (_SHADES - 1)) / (_SHADES - 1)
+    steps = 31  # from one shade to the next
+    level = np.round(np.nan_to_num((values - low) / ((high - low) or 1.0)) * steps) / steps
     colours = np.vectorize(lambda fraction: to_hex(shades(float(fraction))), otypes=[object])(level)
     unit = picture.units["critical"]
     ends = [(to_hex(shades(end)), shown(float(f"{value:.4g}"), unit)) for end, value in ((0.0, low), (1.0, high))]
     return np.where(np.isfinite(values), colours, _NONE), [*ends, (_NONE, "none found")]
 
 
-def _numbers(values: style.Array, unit: str) -> dict[str, Any]:
+def _numbers(values: style.Array, unit: str) -> dict[str, object]:
     """Numbers in the unit of the largest, with the digits that a reader needs; null where there is none."""
     factor, unit = style.prefixed(style.largest(values), unit)
     digits = 5 if values.size <= _WORDY else 4
@@ -140,7 +102,7 @@ def _numbers(values: style.Array, unit: str) -> dict[str, Any]:
     return {"unit": unit, "values": [[*map(shortened, row)] for row in values.tolist()]}
 
 
-def _texts(values: style.Array) -> dict[str, Any]:
+def _texts(values: style.Array) -> dict[str, object]:
     """Texts, each of them once, and the number of the text of each point."""
     texts, places = np.unique(values, return_inverse=True)
     return {"texts": texts.tolist(), "values": places.reshape(values.shape).tolist()}

@@ -351,8 +351,9 @@ def test_keys_of_a_study_are_named_by_the_key_that_scatters() -> None:
     assert of_several._with_its_key("parameter[4].low", [each, each]) == ("link2.angle_deg, low", "deg")
     other = {"parameter[4].key": "shoe.mass", "parameter[4].low": 4.0}
     assert of_several._with_its_key("parameter[4].low", [each, other])[0] == "parameter[4].low"
-    rows = [("link2.angle_deg, low", 4.0, 5.5, "deg"), ("link2.angle_deg, high", 6.0, 7.5, "deg")]
-    assert of_several._changes(rows, 1) == "link2.angle_deg 4 … 6\u00a0deg"
+    ends = ("link2.angle_deg, low", [4.0, 5.5]), ("link2.angle_deg, high", [6.0, 7.5])
+    rows = [of_several._Row(name, values, "deg") for name, values in ends]
+    assert of_several._changes(rows, 0) == "link2.angle_deg 4 … 6\u00a0deg"
 
 
 @pytest.mark.parametrize(
