@@ -242,13 +242,13 @@ def _advice(changes: Sequence[Change], drawn: Left | None) -> dict[str, list[str
     return columns
 
 
-def _moved(remaining: Left | None, drawn: Left) -> str:
+def _moved(squeal: Left | None, drawn: Left) -> str:
     """The frequency of what is left of squeal, where it differs from that of the drawing by more than 5 %."""
-    if remaining is None or not remaining.squeal_frequency or not drawn.squeal_frequency:
+    if squeal is None or not squeal.squeal_frequency or not drawn.squeal_frequency:
         return ""
     # less is not heard as another tone; a choice
-    far = abs(remaining.squeal_frequency / drawn.squeal_frequency - 1.0) > 0.05
-    return f", {remaining.squeal_frequency:.4g} Hz" if far else ""
+    far = abs(squeal.squeal_frequency / drawn.squeal_frequency - 1.0) > 0.05
+    return f", {squeal.squeal_frequency:.4g} Hz" if far else ""
 
 
 def _moves(report: AdviceReport) -> dict[str, list[str]]:

@@ -68,8 +68,8 @@ def _runs(results: Sequence[StoredResult], variable: str, names: Sequence[str], 
     whole = np.concatenate([end for envelope in envelopes for end in envelope[1:]])
     shown = pictures[0].whole
     whole_look = scaled(shown, whole, whole)
-    highest = max((picture.spectrum[2] for picture in pictures), key=style.largest)
-    scale, label = style.density(highest, pictures[0].spectrum[1], VARIABLES[variable][3])
+    highest = max((picture.spectrum.density for picture in pictures), key=style.largest)
+    scale, label = style.density(highest, pictures[0].spectrum.frequency, VARIABLES[variable].unit)
     label = label.removeprefix("power spectral ") if style.is_narrow() or in_a_row else label
     for number, (name, picture, curve) in enumerate(zip(names, pictures, _LOOKS, strict=False)):
         panels[0].plot(times[number][inside[number]], look(details[number]), label=_plain(name), **curve)
@@ -84,14 +84,14 @@ def _runs(results: Sequence[StoredResult], variable: str, names: Sequence[str], 
     _along(panels[0], "time" if same_end else "time before the end of each part", ends, "s")
     detail_names = {picture.detail_name for picture in pictures}
     detail_name = pictures[0].detail_name if len(detail_names) == 1 else "Last part of each"
-    panels[0].set(title=f"{detail_name}: {VARIABLES[variable][0]}", ylabel=look.label)
+    panels[0].set(title=f"{detail_name}: {VARIABLES[variable].title}", ylabel=look.label)
     small = style.is_narrow() or in_a_row
     style.make_room(panels[0], 0.2 * len(results) if small else 0.2)
     panels[0].legend(loc="upper right", ncols=1 if small else len(results))
     spans = [edge for picture in pictures for edge in picture.span]
     _along(panels[1], "time", [min(spans), max(spans)], "s")
     more = "" if small else ", least and largest"
-    panels[1].set(title=f"Whole runs: {VARIABLES[shown][0]}{more}", ylabel=whole_look.label)
+    panels[1].set(title=f"Whole runs: {VARIABLES[shown].title}{more}", ylabel=whole_look.label)
     _spectra(panels[2], pictures, variable, scale, label)
     figure.align_ylabels()
     return figure
@@ -110,12 +110,12 @@ def _wider(picture: RunPicture) -> list[style.Array]:
 def _spectra(axes: Axes, pictures: list[RunPicture], variable: str, scale: float, label: str) -> None:
     """Limits and labels of the spectra, by the lines that both runs have."""
     lines = [HARMONICS * line for picture in pictures if (line := picture.line[1])]
-    highest = min(max(picture.spectrum[1][-1] for picture in pictures), max(lines, default=np.inf))
-    most = scale * max(style.largest(picture.spectrum[2]) for picture in pictures)
+    highest = min(max(picture.spectrum.frequency[-1] for picture in pictures), max(lines, default=np.inf))
+    most = scale * max(style.largest(picture.spectrum.density) for picture in pictures)
     if most:
         axes.set_ylim(FAINTEST * most, 10.0 * most)
     _along(axes, "frequency", [0.0, float(highest)], "Hz")
-    axes.set(title=f"Spectra of {VARIABLES[variable][2]}", ylabel=label)
+    axes.set(title=f"Spectra of {VARIABLES[variable].symbol}", ylabel=label)
 
 
 def _along(axes: Axes, name: str, ends: list[float], unit: str) -> None:

@@ -2,20 +2,33 @@
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from brakecli.views.plots import style
 
-VARIABLES = {  # what `--variable` may name: words, words at the axis with the symbol, symbol, unit
-    "x": ("tangential displacement", "displacement x", "x", "m"),
-    "y": ("normal displacement", "displacement y", "y", "m"),
-    "vx": ("tangential velocity", "velocity ẋ", "ẋ", "m/s"),
-    "vy": ("normal velocity", "velocity ẏ", "ẏ", "m/s"),
-    "friction_force": ("friction force on the shoe", "friction force $F_x$", "$F_x$", "N"),
-    "normal_force": ("normal contact force", "normal force $F_y$", "$F_y$", "N"),
-    "torque": ("braking torque", "braking torque $R F_x$", "$R F_x$", "N m"),
-    "contact_fraction": ("part of the pad that touches", "touching part of the pad", "the touching part", ""),
+
+class Quantity(NamedTuple):
+    """How a quantity is named in a title, at an axis, and as a symbol; its unit."""
+
+    title: str
+    axis: str
+    symbol: str
+    unit: str
+
+
+VARIABLES = {  # what `--variable` may name
+    "x": Quantity("tangential displacement", "displacement x", "x", "m"),
+    "y": Quantity("normal displacement", "displacement y", "y", "m"),
+    "vx": Quantity("tangential velocity", "velocity ẋ", "ẋ", "m/s"),
+    "vy": Quantity("normal velocity", "velocity ẏ", "ẏ", "m/s"),
+    "friction_force": Quantity("friction force on the shoe", "friction force $F_x$", "$F_x$", "N"),
+    "normal_force": Quantity("normal contact force", "normal force $F_y$", "$F_y$", "N"),
+    "torque": Quantity("braking torque", "braking torque $R F_x$", "$R F_x$", "N m"),
+    "contact_fraction": Quantity(
+        "part of the pad that touches", "touching part of the pad", "the touching part", ""
+    ),
 }
 
 
@@ -36,7 +49,8 @@ class Scaled:
 
 def scaled(variable: str, values: style.Array, whole: style.Array, also: float = 0.0) -> Scaled:
     """The axis of values in SI units, as small as they are in the whole run, where `also` is drawn beside them."""
-    _, name, _, unit = VARIABLES[variable]
+    name = VARIABLES[variable].axis
+    unit = VARIABLES[variable].unit
     largest = max(style.largest(whole), also)
     moves = float(np.ptp(values))
     if moves <= max(1e-6 * float(np.ptp(whole)), style.ROUNDING * largest):  # too little for more than a line

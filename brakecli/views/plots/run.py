@@ -5,7 +5,7 @@ The history is read in pieces: a run of 10^8 samples takes no more memory than a
 
 from collections.abc import Callable
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -39,6 +39,14 @@ ROOM = 1.3
 FAINTEST = 1e-10  # of the largest density: what is below shows rounding
 _SHADES = ((ContactState.STICK, style.ORANGE, "stick"), (ContactState.SEPARATED, style.GREY, "no contact"))
 _BELT: style.Look = {"color": style.VERMILION, "ls": style.DASHES}
+
+
+class Spectrum(NamedTuple):
+    """Power spectral density of the variable over frequency (Hz), of the motion from `start` (s) on."""
+
+    start: float
+    frequency: style.Array
+    density: style.Array
 
 
 class RunPicture:
@@ -91,7 +99,7 @@ class RunPicture:
         self.whole_axis = scaled(self.whole, ends[self.whole], ends[self.whole])
         settled = start + self.interval * float(result.group_attributes("spectrum").get("first_sample", 0))
         density = lever.get(variable, 1.0) ** 2 * result.read("spectrum", stored[variable])
-        self.spectrum = settled, result.read("spectrum", "frequency"), density
+        self.spectrum = Spectrum(settled, result.read("spectrum", "frequency"), density)
         fundamental, peak = (result.attributes.get(name) for name in ("frequency", "spectrum_peak"))
         self.line = ("fundamental", fundamental) if fundamental else ("highest peak", peak)  # Hz
         self.resolution = result.attributes.get("frequency_resolution")  # Hz, not in older files
@@ -231,7 +239,7 @@ def _draw_detail(axes: Axes, picture: RunPicture) -> None:
     if picture.near and picture.variable == "vx":
         label = f"U = {look_of.factor * belt[-1]:.4g} {look_of.unit}" if np.ptp(belt) == 0.0 else "U"
         axes.plot(time, look_of(belt), lw=1.1, label=label, **_BELT)
-    axes.set(title=f"{picture.detail_name}: {VARIABLES[picture.variable][0]}", ylabel=look_of.label)
+    axes.set(title=f"{picture.detail_name}: {VARIABLES[picture.variable].title}", ylabel=look_of.label)
     _limit(axes, look_of)
 
 
@@ -271,15 +279,15 @@ def _draw_history(axes: Axes, picture: RunPicture) -> None:
     first, last = picture.detail["time"][[0, -1]]
     if first < last < first + 0.9 * (picture.span[1] - picture.span[0]):
         axes.axvspan(first, last, color=style.GREEN, alpha=0.25, lw=0, zorder=0.5, label="drawn above")
-    axes.set(title=f"Whole run: {VARIABLES[picture.whole][0]}", ylabel=look.label)
+    axes.set(title=f"Whole run: {VARIABLES[picture.whole].title}", ylabel=look.label)
     _limit(axes, look)
 
 
 def _draw_spectrum(axes: Axes, picture: RunPicture) -> None:
     start, frequency, density = picture.spectrum
-    _, _, symbol, unit = VARIABLES[picture.variable]
-    factor, label = style.density(density, frequency, unit)
-    axes.set(title=f"Spectrum of {symbol} from {start:.4g} s on", ylabel=label)
+    quantity = VARIABLES[picture.variable]
+    factor, label = style.density(density, frequency, quantity.unit)
+    axes.set(title=f"Spectrum of {quantity.symbol} from {start:.4g} s on", ylabel=label)
     shown = density > 0.0
     shown[:1] = False  # the mean was removed
     if not shown.any():

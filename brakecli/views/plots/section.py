@@ -1,8 +1,10 @@
 """The Poincaré section of a run: its state once in each period of a passing wave, or at each event of a kind."""
 
 import math
+from typing import NamedTuple
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy.interpolate import CubicHermiteSpline
 
@@ -23,7 +25,14 @@ WAVE = "wave"
 _WITH_THE_WHEEL = ("stick", "slip", "turn")  # where vx is the wheel's speed
 KINDS = (*_WITH_THE_WHEEL, "lift-off", "touch")
 _STATE = ("x", "y", "vx", "vy")
-_Points = dict[str, style.Array]
+
+
+class _Sampled(NamedTuple):
+    """When a history was sampled (s)."""
+
+    start: float
+    end: float
+    interval: float
 
 
 def draw(result: StoredResult, section: str) -> Figure:
@@ -32,51 +41,51 @@ def draw(result: StoredResult, section: str) -> Figure:
     if samples < 2:
         raise style.unreadable(result, "its history has less than two samples")
     start, end = (float(result.read("history", "time", at, at + 1)[0]) for at in (0, samples - 1))
-    time = start, end, (end - start) / (samples - 1)
+    sampled = _Sampled(start, end, (end - start) / (samples - 1))
     settled = min(max(float(result.attributes.get("settled_from") or 0.0), start), end)
-    first = max(min(round((settled - start) / time[2]), samples - 2), samples - MOST)
-    begin = max(settled, start + first * time[2])
+    first = max(min(round((settled - start) / sampled.interval), samples - 2), samples - MOST)
+    begin = max(settled, start + first * sampled.interval)
     if section == WAVE:
-        points, where = _at_waves(result, time, begin)
+        dots, where = _at_waves(result, sampled, begin)
     elif section in KINDS:
-        points = _at_events(result, section, begin)
+        dots = _at_events(result, section, begin)
         where = f"at each {section}"
     else:
         choices = ", ".join((WAVE, *KINDS))
         raise UsageError(f"{argument('section')} {section}: there is no such section; give one of {choices}")
-    last = {name: result.read("history", name, first) for name in _STATE}
-    count = f"{len(points['x'])} points from {begin:.4g} s on"
+    motion = {name: result.read("history", name, first) for name in _STATE}
+    count = f"{len(dots['x'])} points from {begin:.4g} s on"
     title = case_of(result).case.title or "Case without a title"
     verdict = motion_sentence(stored_numbers(result), TERMINAL)  # how the dots are to be read: a torus, chaos
     lines = f"Poincaré section {where}   ·   {count}", verdict
     figure = style.headed(10.4, 4.81, title, *lines, columns=2, wspace=0.05)
     pairs = (("x", "y"), ("x", "vy")) if section in _WITH_THE_WHEEL else (("x", "vx"), ("y", "vy"))
-    wide = 0.01  # of the motion: dots that spread further fill the axes; others are one dot on the motion
-    spreads = {name: (float(np.ptp(points[name])), float(np.ptp(last[name]))) for name in _STATE}
     for axes, pair in zip(style.panels(figure, 1, 2).flat, pairs, strict=True):
-        near = any(spread > wide * whole for spread, whole in map(spreads.__getitem__, pair))
-        shown = points if near else last
-        looks = [scaled(name, shown[name], np.r_[last[name], points[name]]) for name in pair]
-        motion, dots = (
-            [look(states[name]) for name, look in zip(pair, looks, strict=True)] for states in (last, points)
-        )
-        axes.plot(*motion, color=style.GREY, lw=0.4, alpha=0.6 if near else 1.0, label="motion", rasterized=True)
-        axes.plot(*dots, color=style.BLUE, ls="none", marker=".", label="section")
-        axes.set(xlabel=looks[0].label, ylabel=looks[1].label, xlim=looks[0].limits, ylim=looks[1].limits)
-        for name, look, values, limit in zip(pair, looks, dots, (axes.set_xlim, axes.set_ylim), strict=True):
-            if near:
-                spread, whole = spreads[name]
-                middle = 0.5 * float(values.min() + values.max())
-                half = look.factor * max(0.54 * spread, 0.5 * wide * whole)
-                limit(middle - half, middle + half)
+        _draw_panel(axes, pair, dots, motion)
     return figure
 
 
-def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: float) -> tuple[_Points, str]:
-    """The states once in each period of the wave that moves x most, or else of the highest one; words for it.
+def _draw_panel(axes: Axes, pair: tuple[str, str], dots: style.Columns, motion: style.Columns) -> None:
+    """Dots over the motion, by two of their quantities; dots that spread fill the axes."""
+    wide = 0.01  # of the motion: what spreads less is one dot on it
+    spreads = {name: (float(np.ptp(dots[name])), float(np.ptp(motion[name]))) for name in pair}
+    fill = any(spread > wide * whole for spread, whole in spreads.values())
+    looks = [scaled(name, (dots if fill else motion)[name], np.r_[motion[name], dots[name]]) for name in pair]
+    curve, points = (
+        [look(states[name]) for name, look in zip(pair, looks, strict=True)] for states in (motion, dots)
+    )
+    axes.plot(*curve, color=style.GREY, lw=0.4, alpha=0.6 if fill else 1.0, label="motion", rasterized=True)
+    axes.plot(*points, color=style.BLUE, ls="none", marker=".", label="section")
+    limits = [look.limits for look in looks]
+    for number, (spread, whole) in enumerate(spreads.values() if fill else ()):
+        middle = 0.5 * float(points[number].min() + points[number].max())
+        half = looks[number].factor * max(0.54 * spread, 0.5 * wide * whole)
+        limits[number] = middle - half, middle + half
+    axes.set(xlabel=looks[0].label, ylabel=looks[1].label, xlim=limits[0], ylim=limits[1])
 
-    `time` is that of the first and of the last sample, and between two of them (s).
-    """
+
+def _at_waves(result: StoredResult, sampled: _Sampled, begin: float) -> tuple[style.Columns, str]:
+    """The states once in each period of the wave that moves x most, or else of the highest one; words for it."""
     system = system_of(case_of(result).case)
     passing = np.abs(system.belt_speed) * system.wheel.turns
     if not system.steady or not passing.any():
@@ -87,7 +96,7 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
     forced = result.attributes.get("forced_frequency")
     wave = np.argmin(np.abs(passing - forced)) if forced else np.argmax(np.abs(system.wheel.g))
     frequency = float(passing[wave])
-    start, end, interval = time
+    start, end, interval = sampled
     fewest = 8  # samples in a period between which a state is certain
     if frequency * interval > 1.0 / fewest:
         what = f"samples every {interval:.3g} s do not resolve the wave of {frequency:.4g} Hz"
@@ -111,7 +120,7 @@ def _at_waves(result: StoredResult, time: tuple[float, float, float], begin: flo
     return points, f"at each wave of {frequency:.4g} Hz{repeat}"
 
 
-def _at_events(result: StoredResult, kind: str, begin: float) -> _Points:
+def _at_events(result: StoredResult, kind: str, begin: float) -> style.Columns:
     """The states at the events of a kind."""
     if "events" not in result.file:
         remedy = f"run its case again with {argument('set')} output.events=true"

@@ -267,15 +267,14 @@ def _plain(
     """A part with what is said of every result."""
     attributes = result.attributes
 
-    def every() -> list[Section]:
+    def appendix() -> list[Section]:
         source = str(
             attributes.get("sweep_toml") or attributes.get("study_toml") or attributes.get("case_toml", "")
         )
         line = f"brakecli {_COMMANDS[kind].format(_range(result, kind))} -o again.h5"
         again = repeat(result, line, source)
-        over = f"; its case is {case_file or 'the one above'}"
-        shown = "a whole" if "CASE" in line else f"it was given{over}"
-        again.append(Texts([f"{_stands_for(line)}, which is above as {shown}."]))
+        as_what = "a whole" if "CASE" in line else f"it was given; its case is {case_file or 'the one above'}"
+        again.append(Texts([f"{_stands_for(line)}, which is above as {as_what}."]))
         case = Section("Case", case_blocks(case_of(result)))
         return [*sections(), case, Section("How to repeat it", again)]
 
@@ -290,7 +289,7 @@ def _plain(
         change = [Texts([what]), Code(advise)]
         if unknown := _stands_for(advise):
             change.append(Texts([f"{unknown}: a page with --full has the text to copy."]))
-    return Part(name, title, asks, answer, drawn, change, every, numbers, result.versions)
+    return Part(name, title, asks, answer, drawn, change, appendix, numbers, result.versions)
 
 
 def _stands_for(line: str) -> str:
