@@ -112,7 +112,7 @@ def beside(results: Sequence[StoredResult], parts: Sequence[Part], full: bool) -
 def _changes(rows: Sequence[_Row], side: int) -> str:
     """The changed keys of one result with their values; both ends of a range together."""
     said = list[str]()
-    for row, after in zip(rows, [*rows[1:], None], strict=True):
+    for row, after in zip(rows, [*rows, None][1:], strict=True):
         value = shown(row.values[side], row.unit)
         key, _, end = row.name.rpartition(", ")
         if end == "low" and after and after.name == f"{key}, high":

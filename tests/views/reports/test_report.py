@@ -354,6 +354,7 @@ def test_keys_of_a_study_are_named_by_the_key_that_scatters() -> None:
     ends = ("link2.angle_deg, low", [4.0, 5.5]), ("link2.angle_deg, high", [6.0, 7.5])
     rows = [of_several._Row(name, values, "deg") for name, values in ends]
     assert of_several._changes(rows, 0) == "link2.angle_deg 4 … 6\u00a0deg"
+    assert of_several._changes([], 0) == ""
 
 
 @pytest.mark.parametrize(
