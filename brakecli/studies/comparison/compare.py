@@ -22,29 +22,13 @@ from brakecli.solver.system import System
 from brakecli.studies.comparison.methods import kinds, ladder, method_label, rungs
 from brakecli.studies.runs.limits import check, refuse, within_range
 
-BUDGET = 60.0  # s
-# tolerances of the reference, and of the run that shows how good it is
-REFERENCE = 1e-12
-CHECK = 1e-10
-REFERENCE_SHARE = 0.3  # part of the budget that the reference may take
 FEWEST_SAMPLES = 64
-LONGER = 3.0  # times a part of the motion, which the budget must allow for a longer one to be computed
-# part of the budget that it is to take, and times the part before, at most
-AIM = 0.7
-MOST_LONGER = 4.0
-ERRORS_SHARE = 0.8  # part of the budget after which no further error is measured: the rest is for times
-# time of a turn over the last one, and s for each run beside its loop
-SPREAD = 1.3
-BESIDE = 0.005
-ROUNDING = 1e-9  # of the largest velocity: a line below that is rounding
+"""Samples that are compared, and of a line, at least; a choice."""
+MOST_REPEATS = 21
+"""Turns of timing, at most; a choice."""
 # what is compared
 MOTION = ("x", "y", "vx", "vy")
 FORCES = ("friction_force", "normal_force")
-# turns of most loops, and of slow ones: there, chance matters less
-MOST_REPEATS = 21
-SLOW_REPEATS = 3
-SLOW = 0.1  # s, of a loop
-LONGEST_CALL = 1.0  # s, of a loop that is timed in one call; the time that blocks take is small beside longer ones
 LEFT_OUT = "left out: no time within the budget"
 
 
@@ -129,7 +113,7 @@ def compare(
     *,
     schemes: Sequence[str] = (),
     steps: Sequence[float] = (),
-    budget: float = BUDGET,
+    budget: float = 60.0,
     progress: Counted = lambda what, done, total: None,
 ) -> Comparison:
     """Compare the methods on a system within about `budget` s. Raises RefusedError where there is no reference."""
@@ -144,11 +128,11 @@ def compare(
         report = linear.stability(system)
         progress("reference", 0, 0)
         sampled = replace(system, interval=lengths[0])
-        reference = _reference(sampled, REFERENCE_SHARE * budget)
+        reference = _reference(sampled, 0.3 * budget)
         sampled = replace(sampled, duration=(len(reference.rows) - 1) * sampled.interval)
-        checked = _event_driven(sampled, CHECK, "it is not known how good the reference is")
+        checked = _event_driven(sampled, 1e-10, "it is not known how good the reference is")
         reference_error = errors(checked.rows, reference.rows).error
-        _measure(sampled, entries, reference.rows, begin + ERRORS_SHARE * budget, progress)
+        _measure(sampled, entries, reference.rows, begin + 0.8 * budget, progress)  # the rest is for times
         _add_limits(system, report, entries)
         repeats = _repeat(sampled, entries, begin + budget, progress)
     _mark_front(entries)
@@ -180,11 +164,12 @@ def _reference(system: System, budget: float) -> Motion:
     piece = replace(system, duration=shortest)
     whole = max(system.duration, shortest)
     while True:
-        motion = _event_driven(piece, REFERENCE, "there is no reference to compare with")
+        motion = _event_driven(piece, 1e-12, "there is no reference to compare with")
         seconds = motion.work.solve_seconds
-        if piece.duration >= whole or LONGER * seconds > budget:
+        if piece.duration >= whole or 3.0 * seconds > budget:
             return motion
-        longer = piece.duration * min(MOST_LONGER, AIM * budget / max(seconds, 1e-3))
+        # A longer run may take more than in proportion: it aims below the budget, and at most four times as far.
+        longer = piece.duration * min(4.0, 0.7 * budget / max(seconds, 1e-3))
         piece = replace(piece, duration=min(longer, whole))
 
 
@@ -215,14 +200,15 @@ def _repeat(system: System, entries: list[Entry], deadline: float, progress: Cou
     """Time all that ran again, in turns, as often as the budget allows; how many times each."""
     timed = [entry for entry in entries if entry.seconds]
     for repeat in range(MOST_REPEATS):
-        if repeat == SLOW_REPEATS:
-            timed = [entry for entry in timed if entry.seconds[-1] < SLOW]
-        expected = SPREAD * sum(entry.seconds[-1] for entry in timed) + BESIDE * len(timed)
+        if repeat == 3:  # enough for loops of a tenth of a second and more, where chance matters less
+            timed = [entry for entry in timed if entry.seconds[-1] < 0.1]
+        # a turn may take longer than the last one, and each run takes some ms beside its loop
+        expected = 1.3 * sum(entry.seconds[-1] for entry in timed) + 0.005 * len(timed)
         if time.perf_counter() + expected > deadline:
             return max(repeat, 1)
         for done, entry in enumerate(timed):
             progress(f"times, turn {repeat + 1}", done, len(timed))
-            at_once = entry.seconds[-1] < LONGEST_CALL
+            at_once = entry.seconds[-1] < 1.0  # s: the time that blocks take is small beside longer ones
             seconds = _motion(system, entry.method, at_once=at_once).work.solve_seconds
             # The first time counts only where there are no others: it found memory and caches cold
             entry.seconds = [*entry.seconds, seconds] if repeat else [seconds]
@@ -298,7 +284,8 @@ def _line(values: Floats, reference: Floats) -> tuple[float | None, float | None
     late = reference[-count:] - reference[-count:].mean()
     size = np.abs(np.fft.rfft(window * late))
     top = int(np.argmax(size))
-    if top < FEWEST_BINS or size[top] <= ROUNDING * count * float(np.abs(reference).max()):
+    rounding = 1e-9 * count * float(np.abs(reference).max())
+    if top < FEWEST_BINS or size[top] <= rounding:
         return None, None
     turning = np.exp(-2j * math.pi * top / count * np.arange(count)) * window
     exact = complex(turning @ late)

@@ -46,7 +46,7 @@ class ComparisonReport:
         return None if best is None else self.target / best.error
 
     @property
-    def in_a_case(self) -> dict[str, Any]:
+    def in_a_case(self) -> dict[str, object]:
         """Keys of a case, and their values, that ask for the recommended method."""
         if (best := self.recommended) is None:
             return {}
@@ -59,15 +59,14 @@ class ComparisonReport:
 
 def write(path: Path, loaded: LoadedCase, report: ComparisonReport, *, force: bool) -> None:
     """Write the result file; raises UsageError or CannotWriteError."""
-    numbers = report.numbers()
     entries = report.comparison.entries
     index = next((index for index, entry in enumerate(entries) if entry is report.recommended), None)
     with new_result(path, force=force) as result:
         result.set_attributes(origin("comparison", report.title, loaded))
-        result.set_fields(fields.COMPARISON, {**numbers, "recommended": index})
+        result.set_fields(fields.COMPARISON, {**report.numbers(), "recommended": index})
         result.axis("/", fields.ENTRY_PLACE, np.arange(len(entries)))
         for field in fields.ENTRY:
-            values = [entry[field.name] for entry in numbers["entries"]]
+            values = [field.read(entry) for entry in entries]
             if field.name == "theta":
                 values = [", ".join(f"{weight:.6g}" for weight in theta) for theta in values]
             result.column(field, ("entry",), values)

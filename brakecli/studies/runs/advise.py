@@ -25,17 +25,8 @@ from brakecli.studies.runs.judge import judged_in_memory, to_judge
 from brakecli.studies.runs.settled import Judged, settle
 from brakecli.studies.runs.work import stability_work, table_work, work_of
 
-# of a run that checks, which is cut short beyond
-CHECK_WORK = 5.0
-_CHECK_SAMPLES = 1_000_000
-_DECAYED = 15.0
-_DECAYED_SAMPLES = 100_000
-"""Powers of e by which disturbances are to decay in such a run, and the most samples for that."""
-_TIMES = 10.0  # margin beyond which it is said as a factor, not in per cent
-_ALL_CHECKS_WORK = 10.0  # of all runs that check, after which no more is begun
 SMALLEST = "smallest ratio (or rad)"
 """In which order changes stand."""
-_PRESSED_PART = 0.5  # of the load: where less presses the shoe on, the links carry more of it than the pad
 
 
 @dataclass(frozen=True)
@@ -103,7 +94,7 @@ class AdviceReport:
         equilibrium = self.stability.equilibrium
         load = abs(self.system.load_at_start)
         sentences = []
-        if equilibrium is not None and equilibrium.normal_force < _PRESSED_PART * load:
+        if equilibrium is not None and equilibrium.normal_force < 0.5 * load:  # links carry more than the pad
             pressed = f"{float(f'{equilibrium.normal_force:.3g}'):g} N press the shoe on"
             sentences.append(f"of the load of {load:g} N, {pressed}; the links carry the rest")
         if equilibrium is not None and 0.0 < equilibrium.contact_fraction < 1.0:
@@ -213,7 +204,7 @@ def _far(margin: float | None, own: float) -> str:
     """How far the critical friction lies from a case's own."""
     if not margin:
         return ""
-    if margin > _TIMES:
+    if margin > 10.0:  # per cent would be hard to read
         return f", {margin + 1.0:.3g} times the case's {own:g}"
     percent = 100.0 * abs(margin)
     where = "above" if margin > 0.0 else "below"
@@ -265,12 +256,12 @@ def advise(
 def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[Change], dict[str, CheckRun]]:
     """Advice that a run confirms first, what still vibrates last, small changes first; and the runs by key.
 
-    Runs are made for small changes first.
+    Runs are made for small changes first; none is begun after a work of 10.
     """
     checks = dict[str, CheckRun]()
     spent = 0.0
     for change in sorted(advice, key=lambda change: change.size):
-        if change.to is None or spent > _ALL_CHECKS_WORK or (trial := _to_check(case, change)) is None:
+        if change.to is None or spent > 10.0 or (trial := _to_check(case, change)) is None:
             continue
         system, work = trial
         checks[change.parameter] = _checked(system, change, progress)
@@ -285,9 +276,10 @@ def _ranked(case: Case, advice: list[Change], progress: Counted) -> tuple[list[C
 
 
 def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
-    """The case with an advised value, until disturbances have decayed, and the work of its run.
+    """The case with an advised value, until disturbances have decayed by 15 powers of e, and the work of its run.
 
-    It is cut short where that takes long. None where the value, with the digits that are shown, is not valid.
+    For that it has 100 000 samples at most. In any case it is cut short beyond a work of 5, or a million samples:
+    choices. None where the value, with the digits that are shown, is not valid.
     """
     there = of_case.changed(case, key_path(change.parameter), float(change.rounded))
     if there is None:
@@ -296,8 +288,8 @@ def _to_check(case: Case, change: Change) -> tuple[System, float] | None:
     answer = of_case.answer(there, 0.0)
     work = work_of(system).amount
     decays = -answer.growth if answer and answer.growth and system.steady else 0.0
-    long = min(_DECAYED / (decays * system.duration), _DECAYED_SAMPLES / system.samples) if decays > 0.0 else 1.0
-    factor = min(max(long, 1.0), CHECK_WORK / max(work, 1e-9), _CHECK_SAMPLES / system.samples)
+    long = min(15.0 / (decays * system.duration), 100_000 / system.samples) if decays > 0.0 else 1.0
+    factor = min(max(long, 1.0), 5.0 / max(work, 1e-9), 1_000_000 / system.samples)
     return replace(system, duration=factor * system.duration), factor * work
 
 

@@ -23,9 +23,6 @@ from brakecli.studies.runs.work import FINEST, evaluation_work, work_done
 
 PART = 0.1
 """Error of the reference over the promised one."""
-OF_EXPONENT = 1e-3
-"""Tolerance of the motion whose exponent is asked beside a run with a given step; a choice. Rates of growth swing
-by far more from one part of a run to the next."""
 MOST_RUNS = 5
 """Runs of the scheme, at most."""
 AIM = 0.5
@@ -33,19 +30,10 @@ AIM = 0.5
 AIM_OF_NODES = 0.25
 """and to its nodes. With that of the reference, 0.15 is left for what the order does not foresee."""
 MOST = 32.0
-LEAST = 1.25
-"""By what a step becomes shorter from one run to the next, at most and at least: choices. The order says nothing
-of large errors, and a step that is hardly shorter may not change anything."""
-MOST_NODES = 16.0
-"""By what nodes become more than those of the run that tells their error, at most; a choice, as errors may grow
-beyond all bounds. So many make an error of one a thousandth and less."""
+"""By what a step becomes shorter from one run to the next, at most; a choice, as the order says nothing of large
+errors."""
 FAILED = 4.0
 """By what it becomes shorter where a run has failed; a choice."""
-LEAST_ORDER = 0.5
-"""Order of an error, at least; a choice. Beside kinks errors fall unevenly, with order one or by chance less: with
-one at least, a wheel that turns back and forth within a step takes more than five runs."""
-SMALL = 0.1
-"""Error below which two runs show the order of a scheme."""
 
 
 def reference_of(system: System) -> System:
@@ -60,13 +48,14 @@ def exponent_of(system: System, track: Track) -> Exponent | None:
     """The exponent beside the history of a difference scheme, which carries no disturbance along.
 
     It is that of the motion of the equations from the state that the history has reached at its half, for as long
-    as the history lasts: what the scheme made of the way there is not asked again.
+    as the history lasts: what the scheme made of the way there is not asked again. Its tolerance is a choice, as
+    rates of growth swing by far more from one part of a run to the next.
     """
     half = len(track.times) // 2
     x, y, v_x, v_y = track.states[half].tolist()
     reached = Initial(x=x, y=y, vx=v_x, vy=v_y)
     wheel = turned(system.wheel, system.belt_speed * float(track.times[half]))
-    precise = system.by(step=None, tolerance=OF_EXPONENT / PART)
+    precise = system.by(step=None, tolerance=1e-3 / PART)
     return solve(first_of(reference_of(replace(precise, initial=reached, wheel=wheel)))).exponent
 
 
@@ -130,14 +119,19 @@ def against(system: System, reference: Certified, run: Callable[[System], Motion
 
 
 def _finer(system: System, before: _Tried | None, tried: _Tried) -> float:
-    """By what the next step is shorter: by the order of the scheme, or by what it shows, if that is less."""
+    """By what the next step is shorter: by the order of the scheme, or by what it shows, if that is less.
+
+    Two runs show it from small errors on. It counts as one half at least: beside kinks errors fall unevenly, with
+    order one or by chance less. With one at least, a wheel that turns back and forth within a step takes more than
+    five runs. A step that is hardly shorter may not change anything. These are choices.
+    """
     method = system.method
     order = float(system.scheme.order(system.weights, method.start))
-    if before and before.error < SMALL:
+    if before and before.error < 0.1:
         shown = math.log(max(before.error / tried.error, 1.0)) / math.log(before.step / tried.step)
-        order = min(order, max(shown, LEAST_ORDER))
+        order = min(order, max(shown, 0.5))
     excess = max(tried.error / (AIM * method.tolerance), 1.0)
-    return float(min(MOST, max(LEAST, excess ** (1.0 / order))))
+    return float(min(MOST, max(1.25, excess ** (1.0 / order))))
 
 
 def _with_nodes(
@@ -160,7 +154,8 @@ def _with_nodes(
         spent = (*spent, motion.work)
     fraction = reference.certificate.certified_until / system.sampled_duration
     error = SAFETY * Known.of_run(motion).by_nodes(fraction)
-    more = min((error / (AIM_OF_NODES * wanted)) ** (1.0 / ORDER_OF_NODES), MOST_NODES)
+    # Errors may grow beyond all bounds; 16 times as many nodes make an error of one a thousandth and less.
+    more = min((error / (AIM_OF_NODES * wanted)) ** (1.0 / ORDER_OF_NODES), 16.0)
     nodes = max(nodes, NODES * math.ceil(more * motion.system.nodes / NODES))
     on_nodes = system.by(nodes=nodes)
     exact = system.by(evaluator="exact")

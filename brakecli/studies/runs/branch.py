@@ -23,9 +23,6 @@ from brakecli.results.write import ResultFile, new_result
 from brakecli.solver.arrays import Floats
 from brakecli.studies.runs.run import origin
 
-MULTIPLIERS = 4
-NAMED = 3
-"""Keys that a note names; a choice."""
 EQUATIONS = ALONE | {"roughness"}
 """Tables of a case whose keys enter the equations of motion."""
 
@@ -105,11 +102,9 @@ def foreign(line: Line, starts: Sequence[Start]) -> list[str]:
         differing = [name for name in {**own, **there} if own.get(name) != there.get(name)]
         if differing:
             shown = [_compared(name, there.get(name), own.get(name)) for name in differing]
-            more = f", and {len(shown) - NAMED} more" if len(shown) > NAMED else ""
+            shown[3:] = [f"and {len(shown) - 3} more"] * (len(shown) > 3)
             value = _value(line, start)
-            notes.append(
-                f"the motion given for {value:.6g} is one of another case ({', '.join(shown[:NAMED])}{more})"
-            )
+            notes.append(f"the motion given for {value:.6g} is one of another case ({', '.join(shown)})")
     return notes
 
 
@@ -155,14 +150,15 @@ def _write_one(result: ResultFile, group: str, curve: Followed, units: str) -> N
     result.set_attributes({"kind": curve.kind, "note": curve.note}, group)
     if lower := curve.unstable_lower:
         result.set_attributes({"unstable_lower": lower, "unstable_upper": curve.unstable_upper}, group)
+    multipliers = range(1, 5)  # one for each of x, y, v_x and v_y
     if curve.points:
-        result.axis(group, integer("multiplier", "number of the multiplier"), range(1, MULTIPLIERS + 1))
+        result.axis(group, integer("multiplier", "number of the multiplier"), multipliers)
         result.axis(group, Field("part", "", "of a complex number", "S"), ["real", "imaginary"])
     for field in fields.BRANCH_POINT:
         own = replace(field, units=units or "1") if field.units == "of the key" else field
         if field.name == "multipliers":
             if curve.points:
-                values = np.full((len(curve.points), MULTIPLIERS, 2), np.nan)
+                values = np.full((len(curve.points), len(multipliers), 2), np.nan)
                 for row, point in zip(values, curve.points, strict=True):
                     for k, factor in enumerate(point.multipliers):
                         row[k] = _finite(factor.real), _finite(factor.imag)

@@ -30,19 +30,9 @@ from brakecli.studies.runs.plausible import implausible
 from brakecli.studies.runs.settled import longest
 from brakecli.studies.runs.work import held_bytes, work_of
 
-_TWO_DIGITS = Context(prec=2, rounding=ROUND_DOWN)
 MOST_BYTES = 1e11
 UNSTABLE = 1e-5  # growth per step that no rounding of the eigenvalues explains
-_COARSE_NODES = 0.5  # over the usual ones
-_TAKEN = 0.01  # part of the fastest motion that a scheme may take out of a run unsaid
 FILE_BYTES = 1e5  # of a result without its samples
-_PROCESS_BYTES = 2e8  # of memory, without histories and tables
-_ABOVE_NYQUIST = 0.4  # of a period: the longest advised sample interval, with room below half of it
-# step over that of the case to which a stable one is sought, and its bracket
-_SHORTEST = 1e-6
-_KNOWN = 1.001
-_GROWN = 1e-3  # growth by the end of the run that is worth a warning
-_ROUNDING = 1e-8  # of the factors of a step
 
 
 @dataclass(frozen=True)
@@ -75,7 +65,7 @@ def check(system: System) -> Check:
         steps_per_period=math.inf if own or not fastest > 0.0 else 1.0 / (fastest * system.step),
         limits=step_limits(system),
         nodes_per_wave=system.nodes / waves if system.nodes and waves > 0.0 else None,
-        memory=_PROCESS_BYTES + system.table_bytes + held_bytes(system),
+        memory=2e8 + system.table_bytes + held_bytes(system),  # 200 MB for the process itself
         file_size=float(system.samples) * ROW_BYTES + FILE_BYTES,
         adjustments=tuple(adjustments(system)),
     )
@@ -114,14 +104,16 @@ def _longest_stable_step(system: System) -> float | None:
     def is_stable(step: float) -> bool:
         return not _blows_up(step_limits(system, step).growth, system.sampled_duration / step)
 
-    if not is_stable(_SHORTEST * system.step):
+    shortest = 1e-6 * system.step
+    if not is_stable(shortest):
         return None
-    return bisect(is_stable, _SHORTEST * system.step, system.step, ratio=_KNOWN, geometric=True)[0]
+    return bisect(is_stable, shortest, system.step, ratio=1.001, geometric=True)[0]
 
 
 def _down(number: float) -> str:
     """Two digits of a number, rounded down: what is advised is not more than what helps."""
-    return f"{float(_TWO_DIGITS.create_decimal_from_float(number)):.2g}"
+    two_digits = Context(prec=2, rounding=ROUND_DOWN)
+    return f"{float(two_digits.create_decimal_from_float(number)):.2g}"
 
 
 def adjustments(system: System) -> list[str]:
@@ -166,10 +158,10 @@ def _warnings(checked: Check) -> Iterator[str]:
     for what, frequency in (("the contact resonance", contact), ("the shortest wave of the wheel", waves)):
         if frequency > nyquist:
             above = f"lies above half the sampling rate ({nyquist:.4g} Hz) and would be aliased"
-            remedy = f"sample every {_down(_ABOVE_NYQUIST / frequency)} s or more often"
+            remedy = f"sample every {_down(0.4 / frequency)} s or more often"  # with room below half a period
             yield f"output.sample_interval: {what} at {frequency:.4g} Hz {above} in the spectra; {remedy}"
     if per_wave is not None:
-        coarse = _COARSE_NODES * EVALUATORS[system.evaluator].nodes_per_wave
+        coarse = 0.5 * EVALUATORS[system.evaluator].nodes_per_wave  # half of the usual ones
         nodes = min(system.method.nodes or system.nodes, system.nodes)
         if per_wave * nodes < coarse * system.nodes:
             remedy = f"take at least {math.ceil(system.nodes * coarse / per_wave)}, or leave nodes out"
@@ -222,11 +214,11 @@ def _of_the_scheme(system: System, limits: StepLimits, steps: int) -> Iterator[s
     if not limits.unique:
         wedged = "friction can wedge the shoe into the wheel within a step; reduce solver.step or the coefficient"
         yield f"friction.coefficient: a step may have more than one solution, as {wedged}"
-    if limits.growth > 1.0 + max(UNSTABLE, _GROWN / steps):
+    if limits.growth > 1.0 + max(UNSTABLE, 1e-3 / steps):  # a thousandth by the end of the run
         what = f"the scheme itself multiplies disturbances by {limits.growth:.6g} in each step"
         yield f"solver.theta: {what}; reduce solver.step, {method.row.unstable}"
     taken = 0.0 if method.own_steps else _taken(system, steps)
-    if taken > _TAKEN:
+    if taken > 0.01:
         away = f"it takes {100.0 * taken:.3g} % of the fastest motion away by the end of the run"
         what = f"the scheme itself damps, {away}, and its errors are of first order"
         yield f"solver.theta: with these weights {what}; {without_damping(method)}"
@@ -238,7 +230,7 @@ def _taken(system: System, steps: int) -> float:
     scheme = module_of(system.method.scheme)
     factors = np.linalg.eigvals(amplification(c, system.weights, scheme, system.contact_stiffness))
     factor = float(np.abs(factors[np.argmax(np.abs(np.angle(factors)))]))  # not a direction without a spring
-    if factor > 1.0 - _ROUNDING:
+    if factor > 1.0 - 1e-8:  # what is less is rounding
         return 0.0
     return -math.expm1(steps * math.log(factor)) if factor > 0.0 else 1.0
 

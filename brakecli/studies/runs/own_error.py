@@ -27,14 +27,7 @@ MOST_WORK = 900.0
 """Work of all runs, as `runs.work` counts it, after which no finer one is begun; a choice."""
 AIM = 0.4
 """Part of the promise that a finer run leaves to steps, and to nodes."""
-_FAR = 2.0
-"""Error of steps over the promised one, beyond which a run ends early: a finer one has to follow anyway."""
 _MOST_RUNS = 8
-# factors by which tolerance and nodes change at once
-_LEAST = 1e-3
-_MOST = 8.0
-_BEYOND = 1e-3  # times the finest: a tolerance that no run has, as errors may fall faster than it
-_SURER = 0.03  # of its error, that the next run is to have where an event may have been missed
 _EXACT = 3.0  # evaluations of the exact contact for one by nodes, as steps are shorter and of higher order
 
 
@@ -101,7 +94,7 @@ def promised(
     seconds = 0.0
     counted = 0.0
     steps_before = 0
-    most = _FAR * wanted / safety
+    most = 2.0 * wanted / safety  # by steps; a run ends early beyond, as a finer one has to follow anyway
     for remaining in range(_MOST_RUNS, 0, -1):
         most = most if remaining > 1 else math.inf
         motion = yield replace(rung, most_error=most)
@@ -120,7 +113,7 @@ def promised(
         late = counted > MOST_WORK
         if certified or failed or most == math.inf or (late and not coarse):
             break
-        surer = _SURER if errors.unsure < duration else math.inf
+        surer = 0.03 if errors.unsure < duration else math.inf  # a choice where an event may have been missed
         aim = min(AIM * wanted / safety, surer * both)
         factor = 1.0
         if coarse:  # errors of steps add up, those of nodes at random; half the aim, as that is a guess
@@ -154,12 +147,12 @@ def promised(
 
 
 def _finer(system: System, rung: System, steps: float, by_nodes: float) -> System | None:
-    """A finer event-driven run."""
+    """A finer event-driven run, to a thousandth of the tolerance at least, with 8 times as many nodes at most."""
     at = rung.method
-    if at.tolerance < _BEYOND * FINEST * steps:
+    if at.tolerance < 1e-3 * FINEST * steps:  # no run has such a tolerance, though errors may fall faster than it
         return None
-    tolerance = max(at.tolerance * max(1.0 / steps, _LEAST), FINEST)
-    more = min(by_nodes ** (1.0 / ORDER_OF_NODES), _MOST)
+    tolerance = max(at.tolerance * max(1.0 / steps, 1e-3), FINEST)
+    more = min(by_nodes ** (1.0 / ORDER_OF_NODES), 8.0)
     run = _run(system, tolerance, NODES * -int(-rung.nodes * more // NODES))
     return run if run.method != at else None
 

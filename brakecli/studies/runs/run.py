@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from dataclasses import astuple, dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import h5py
 import numba
@@ -61,7 +60,7 @@ class RunReport:
         """How the run has ended, in a word."""
         return "failed" if self.motion.work.failed else "done"
 
-    def numbers(self) -> dict[str, Any]:
+    def numbers(self) -> dict[str, object]:
         """Names and values as `--json` gives them."""
         numbers = values_of(fields.RUN, self)
         if self.motion.system.method.own_steps:
@@ -147,9 +146,9 @@ def run(
 def _history_sink(result: ResultFile, interval: float) -> Sink:
     """Declare the history of a file; what is returned writes samples to it."""
     names = " ".join(state.name.lower() for state in ContactState)
-    states: dict[str, Any] = {"flag_values": np.array(list(ContactState), dtype=np.int8), "flag_meanings": names}
+    states = {"flag_values": np.array(list(ContactState), dtype=np.int8), "flag_meanings": names}
     for field in fields.HISTORY:
-        result.variable("history", field, ("time",), **(states if field.name == "state" else {}))
+        result.variable("history", field, ("time",), None, **(states if field.name == "state" else {}))
 
     def append(rows: NDArray[np.float64]) -> None:
         refuse_overflow(rows)
@@ -223,7 +222,7 @@ def _write_events(result: ResultFile, track: Track) -> tuple[str, ...]:
     return (warning,) if earlier else ()
 
 
-def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, Any]:
+def origin(kind: str, title: str, loaded: LoadedCase) -> dict[str, str]:
     """The attributes that say where a result comes from: the case and the versions."""
     case = {"case_toml": loaded.text, "resolved_toml": loaded.resolved}
     return {"kind": kind, "title": title, **case, "brakecli_version": __version__, **versions()}

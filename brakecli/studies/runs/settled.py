@@ -18,7 +18,6 @@ from brakecli.studies.runs.certificate import Certificate
 
 MOST_SAMPLES = 2_000_000
 """Samples of the longest run that is tried: a worker of a sweep holds them in memory, with half a GB."""
-_DIGITS = 2  # of a budget that is advised
 
 
 class Ends(Protocol):
@@ -100,5 +99,5 @@ def settle(system: System, run: Callable[[System], Judged[M]]) -> Settled[M]:
 
 def rounded_up(count: int) -> int:
     """The least number of two digits and noughts that is not below a count."""
-    unit: int = 10 ** max(0, len(str(count)) - _DIGITS)
+    unit: int = 10 ** max(0, len(str(count)) - 2)
     return -(-count // unit) * unit

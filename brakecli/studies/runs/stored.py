@@ -30,8 +30,8 @@ class Stored(NamedTuple):
 
     system: System
     history: History
-    attributes: Mapping[str, Any]
-    evidence: Mapping[str, Any]
+    attributes: Mapping[str, object]
+    evidence: Mapping[str, object]
 
 
 def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
@@ -72,7 +72,7 @@ def classify_result(path: Path, thresholds: Thresholds) -> dict[str, Any]:
     )
 
 
-def _older(evidence: Mapping[str, Any]) -> bool:
+def _older(evidence: Mapping[str, object]) -> bool:
     """Whether a record lacks answers that rows ask for: all of them, or what powers leave open."""
     return "row" not in evidence or ("power_of_friction" in evidence and "power_stored" not in evidence)
 

@@ -21,22 +21,19 @@ from brakecli.studies.runs.tolerance import begins_with_steps
 
 TOGETHER = 64
 """Cases that are certified side by side."""
-FIRST_TURN = 0.12
-AT = 1e-3
-"""By which angle (rad) the fastest motion turns in a first step, for this tolerance."""
 SAFETY = 3.0
 """What is promised, over the error that a run in a lane knows; docs/accuracy.md compares that with true ones."""
 ORDER = 3
 ORDER_OF_NODES = 2
 """Least order with which errors by steps fall, and those by nodes, of the midpoint rule."""
-_MOST = 16.0  # times as fine, beyond which a run of its own is cheaper
 
 
 def _runs(system: System) -> Generator[System, Motion, Certified]:
     """What is run in lanes for a promise."""
     fastest = 2.0 * math.pi * system.natural_frequencies[1]
     waves = FIRST_PER_WAVE * system.passing_frequency
-    turn = FIRST_TURN * (system.method.tolerance / AT) ** (1.0 / ORDER)
+    # by which angle (rad) the fastest motion turns in a first step
+    turn = 0.12 * (system.method.tolerance / 1e-3) ** (1.0 / ORDER)
     nodes = 2 * first_nodes(system, ORDER_OF_NODES)
     start_error = displacement(system)
 
@@ -50,7 +47,8 @@ def _runs(system: System) -> Generator[System, Motion, Certified]:
         shorter = steps ** (1.0 / ORDER)
         more = by_nodes ** (1.0 / ORDER_OF_NODES)
         candidate = rung(shorter * run.per_sample, more * run.nodes / nodes)
-        return None if max(shorter, more) > _MOST or exact_is_cheaper(candidate, system) else candidate
+        dear = max(shorter, more) > 16.0  # a run of its own is cheaper then
+        return None if dear or exact_is_cheaper(candidate, system) else candidate
 
     return promised(system, rung(system.interval * max(fastest / turn, waves), 1.0), finer, SAFETY)
 

@@ -23,12 +23,7 @@ from brakecli.studies.runs.certificate import (
 from brakecli.studies.runs.own_error import by_own_error, last_of
 from brakecli.studies.runs.work import evaluation_work
 
-# Work is counted, no clock is asked, so that a case gives the same bytes wherever it runs.
-FIRST_BLOCK = 5e-3  # work of the first block of a run whose steps take one evaluation of the contact
-SHORTER = 0.7  # step of the second of two piecewise-exact runs over that of the first
-ROUNDED_MARGIN = 20.0  # the error of a piecewise-exact run over the rounding that it has carried along, at most
-ROUNDING_MARGIN = 4.0  # the error of such a run over what two of them differ by, at most
-NODES_FROM = 1e-5  # tolerance from which on lanes are worth a try
+ROUNDING_MARGIN = 4.0  # the error of a piecewise-exact run over what two of them differ by, at most
 
 
 def certify(system: System, progress: Progress = lambda samples: None) -> Certified:
@@ -52,37 +47,39 @@ def begins_with_steps(system: System) -> bool:
     """Whether steps and nodes that are refined apart may keep the tolerance."""
     method = system.method
     chosen = method.automatic and method.own_steps and not method.row.exact
-    return chosen and method.tolerance >= NODES_FROM and system.steady
+    return chosen and method.tolerance >= 1e-5 and system.steady  # below, lanes are not worth a try
 
 
 def _solved(system: System, progress: Progress) -> Motion:
+    """The motion. Work sizes its first block, no clock, so that a case gives the same bytes wherever it runs."""
     per_sample = system.per_sample
     block = 1
     if system.nodes or not system.method.own_steps:
-        block += int(FIRST_BLOCK / (evaluation_work(system) + 1e-6))
+        block += int(5e-3 / (evaluation_work(system) + 1e-6))
     return solve(system, progress=lambda steps: progress(steps // per_sample), first_block=block)
 
 
 def _by_phases(system: System, progress: Progress) -> Certified:
     """A piecewise-exact run, whose only error is rounding: each step adds some to what it carries along.
 
-    Where that may be too much, a replica with other steps shows what the motion makes of it. Where samples are
-    close, a step of this run passes over several of them.
+    The error is 20 times what it has carried along, at most. Where that may be too much, a replica with shorter
+    steps shows what the motion makes of it. Where samples are close, a step of that passes over several of them.
     """
     wanted = system.method.tolerance
     run = _solved(system, progress)
-    longest = SHORTER * system.longest_step
+    shorter = 0.7
+    longest = shorter * system.longest_step
     largest, carried = run.work.rounding or (np.zeros(4), np.zeros(4))
     size = sizes(system, largest, largest)
     relative = np.divide(carried, size, out=np.zeros(4), where=np.isfinite(size))  # what rests has no error
-    error = max(ROUNDED_MARGIN * float(relative.max()), ROUNDING)
+    error = max(20.0 * float(relative.max()), ROUNDING)
     if error <= wanted and not run.work.failed:
         how = f"the rounding of piecewise-exact steps of {run.system.step:.3g} s"
         return Certified(run, Certificate(wanted, True, error, system.sampled_duration, how))
     every = max(n for n in range(1, 1 + max(1, int(longest / system.interval))) if system.samples % n == 0)
     share = min(1.0, run.system.step / system.longest_step) if every == 1 else 1.0
     sparse = replace(system, interval=every * system.interval, duration=system.sampled_duration)
-    other = _solved(replica(sparse).by(share=SHORTER * share), lambda samples: None)
+    other = _solved(replica(sparse).by(share=shorter * share), lambda samples: None)
     run.work.solve_seconds += other.work.solve_seconds
     run.work.coarser_steps = other.work.steps
     apart = compare(run, other)

@@ -18,43 +18,11 @@ from brakecli.solver.schedules import values
 from brakecli.solver.steady_sliding import PLACES, TABLE, averaged_length, fills_window, steady_sliding
 from brakecli.solver.system import System
 
-# Measured with `make cases` on one core, in seconds.
+# s, measured with `make cases` on one core, as all numbers of this file that give no other reason
 _STEP_WORK = 1.5e-7
-_NODE_WORK = 1.2e-9  # per node, and again per node and wave of the wheel:
-_NODE_WAVE_WORK = 1e-10
-# with a window: as many waves; to fill it, per point and wave
-_WINDOW_WAVES = 3
-_POINT_WAVE_WORK = 1.5e-10
-# exact, for each wave on the pad: per harmonic, and per pair of them
-_TERM_WORK = 2.5e-8
-_PAIR_WORK = 5e-10
-# of waves in full contact, which take as long as the rest of a step
-_PAIRS = 20.0
-_OWN_PAIRS = 80.0
-_EVALUATIONS = 1.5  # of the contact in a step
-# in a period, of a scheme that finds them itself, at this tolerance
-_OWN_STEPS = 25.0
-_AT = 1e-10
-_ORDER = 8  # of these steps
-# such steps for a passing wave, and decay rate times such a step
-_STEPS_PER_WAVE = 8.0
-_DECAY = 4.0
-# tolerance of steps over that of histories, and its bounds
-_FINER = 1e-5
+_OWN_STEP_WORK = 4e-6  # of a scheme that finds its steps itself
 FINEST = 1e-13
-_COARSEST = 1e-8
-_RUNS = 1.6  # where histories keep a tolerance
-# part of the time in which a pad is open in part: under load, and elsewhere
-_PRESSED = 0.01
-_PLAYS = 0.12
-_OWN_STEP_WORK = 4e-6
-_OWN_EVALUATIONS = 27.0
-_EXACT_STEP_WORK = 1e-7  # events included
-_START_EVALUATIONS = 6.0  # at each place of the wheel, to find steady sliding
-_TABLE_WORK = 4e-9  # to fill a byte of the tables of the contact
-# histories: two with what compares them, or one while it is joined
-_HELD = 4.0
-_HELD_EXACT = 2.0
+"""Least tolerance of the steps of such a scheme."""
 
 
 class Work(NamedTuple):
@@ -69,32 +37,34 @@ def work_of(system: System) -> Work:
     method = system.method
     pairs = 0.0 if system.window_rows else float(len(system.wheel.g) ** 2)
     if not method.own_steps:
-        per_step = _STEP_WORK * (1.0 + pairs / _PAIRS)
+        per_step = _STEP_WORK * (1.0 + pairs / 20.0)  # in full contact, where so many take as long as the rest
         if system.finds_patches or system.nodes:
-            per_step = _STEP_WORK + _EVALUATIONS * evaluation_work(system)
+            per_step = _STEP_WORK + 1.5 * evaluation_work(system)
         window = _window_work(system, system.sampled_duration * system.fastest_belt)
         return Work(system.steps, system.steps * per_step + window)
     c = system.coefficients
     alone = method.step is not None
     if method.row.exact:
-        return Work(system.steps, system.steps * _EXACT_STEP_WORK)
-    tolerance = method.tolerance if alone else max(min(_FINER * method.tolerance, _COARSEST), FINEST)
+        return Work(system.steps, system.steps * 1e-7)  # with events
+    # That of steps is far below that of histories.
+    tolerance = method.tolerance if alone else max(min(1e-5 * method.tolerance, 1e-8), FINEST)
     fastest = system.natural_frequencies[1]
     start = system.initial
     bound = c.c_xx + c.c_yy + 2.0 * abs(c.c_xy) + (1.0 + c.phi) * system.contact_stiffness  # as a step is limited
-    rate = max(fastest * _OWN_STEPS * (_AT / tolerance) ** (1.0 / _ORDER), 0.5 * math.sqrt(bound / c.m))
+    # 25 steps of order 8 to a period at 1e-10, and eight to a passing wave; dashpots shorten them to 4 decay times
+    rate = max(fastest * 25.0 * (1e-10 / tolerance) ** (1.0 / 8.0), 0.5 * math.sqrt(bound / c.m))
     swing = 2.0 * math.pi * fastest * (abs(start.x) + abs(start.y)) + abs(start.vx) + abs(start.vy)
     turns = float(max(system.wheel.turns, default=0.0))
-    rate += _STEPS_PER_WAVE * turns * (system.fastest_belt + swing) + (c.b_xx + c.b_yy) / _DECAY / c.m
+    rate += 8.0 * turns * (system.fastest_belt + swing) + (c.b_xx + c.b_yy) / 4.0 / c.m
     steps = 1 + int(min(system.sampled_duration * rate, 1e300))
-    per_step = _OWN_STEP_WORK * (1.0 + pairs / _OWN_PAIRS)
+    per_step = _OWN_STEP_WORK * (1.0 + pairs / 80.0)
     if system.finds_patches:
-        # Rough surfaces that the load presses together are seldom open in part.
+        # Rough surfaces that the load presses together are seldom open in part; a step takes 27 evaluations there.
         heights = float(np.abs(system.shoe.g).sum() + np.abs(system.wheel.g).sum())
         least_load = float(np.abs(values(system.load)).min())
-        open_part = _PRESSED if heights * (c.c_yy + system.contact_stiffness) < least_load else _PLAYS
-        per_step += _OWN_EVALUATIONS * open_part * evaluation_work(system)
-    return Work(steps, (1.0 if alone else _RUNS) * steps * per_step)
+        open_part = 0.01 if heights * (c.c_yy + system.contact_stiffness) < least_load else 0.12
+        per_step += 27.0 * open_part * evaluation_work(system)
+    return Work(steps, (1.0 if alone else 1.6) * steps * per_step)  # more runs, where histories keep a tolerance
 
 
 def work_done(system: System, done: integrate.Work) -> float:
@@ -109,7 +79,8 @@ def held_bytes(system: System) -> float:
     """Memory for the histories that are held to keep a tolerance; 0 with a step, whose samples go to the file."""
     if system.method.step is not None:
         return 0.0
-    return (_HELD_EXACT if system.method.row.exact else _HELD) * 8.0 * len(HISTORY) * system.samples
+    histories = 2.0 if system.method.row.exact else 4.0  # one while it is joined; two with what compares them
+    return histories * 8.0 * len(HISTORY) * system.samples
 
 
 def stability_work(system: System) -> float:
@@ -117,12 +88,12 @@ def stability_work(system: System) -> float:
     tried = np.linspace(0.0, LARGEST_FRICTION, FRICTIONS).tolist()
     if system.belt_speed == 0.0 or not any(_opens(system, phi) for phi in tried):
         return 0.0
-    return (TABLE + _START_EVALUATIONS) * _average_work(system)
+    return (TABLE + 6.0) * _average_work(system)  # some at each place of the wheel, to find steady sliding
 
 
 def table_work(system: System) -> float:
     """The work of filling the tables of the contact, which very many waves make long."""
-    return _TABLE_WORK * system.table_bytes
+    return 4e-9 * system.table_bytes
 
 
 def _average_work(system: System) -> float:
@@ -157,12 +128,12 @@ def evaluation_work(system: System, *, summed: bool = False) -> float:
     if system.finds_patches:
         terms = len(system.shoe.g) + len(system.wheel.g)
         waves = 1.0 + 2.0 * system.half_length * system.most_turns
-        return waves * terms * (_TERM_WORK + _PAIR_WORK * terms)
-    waves = _WINDOW_WAVES if system.window_rows and not summed else len(system.wheel.g)
-    return system.nodes * (_NODE_WORK + _NODE_WAVE_WORK * waves)
+        return waves * terms * (2.5e-8 + 5e-10 * terms)  # per harmonic, and per pair of them
+    waves = 3 if system.window_rows and not summed else len(system.wheel.g)  # a window takes as long as three
+    return system.nodes * (1.2e-9 + 1e-10 * waves)
 
 
 def _window_work(system: System, travel: float) -> float:
     """The work of filling the window while the wheel travels so far (m)."""
     points = system.nodes * system.window_rows * (1.0 + travel / (2.0 * system.half_length))
-    return points * len(system.wheel.g) * _POINT_WAVE_WORK
+    return points * len(system.wheel.g) * 1.5e-10

@@ -106,17 +106,25 @@ def _squeal(case: Case) -> Left | None:
     if frequencies is None:
         return None
     hits = frequencies > 0.0
-    return _of_samples(hits, squeal_frequency=_median(frequencies[hits]), unstable=hits)
+    return _of_samples(hits, frequencies[hits], hits)
 
 
-def _of_samples(hits: NDArray[np.bool_], **more: Any) -> Left:
-    """What samples say of squeal, some of which are hits."""
+def _of_samples(
+    hits: NDArray[np.bool_], frequencies: Floats, unstable: NDArray[np.bool_], beside: float | None = None
+) -> Left:
+    """What samples say of squeal: which squeal, the frequencies (Hz) of all that vibrate, which are unstable.
+
+    `beside`: the part that is unstable without squeal.
+    """
     share = Probability.of(hits)
-    return Left(squeal_probability=share.value, squeal_lower=share.lower, squeal_upper=share.upper, **more)
-
-
-def _median(values: Floats) -> float | None:
-    return float(np.median(values)) if values.size else None
+    return Left(
+        squeal_probability=share.value,
+        squeal_lower=share.lower,
+        squeal_upper=share.upper,
+        unstable_elsewhere=beside,
+        squeal_frequency=float(np.median(frequencies)) if frequencies.size else None,
+        unstable=unstable,
+    )
 
 
 def squealing(case: Case) -> NDArray[np.bool_] | None:
@@ -196,12 +204,7 @@ def under_scatter(
         beside = elsewhere(study, columns)
         unstable = (hits | beside).reshape(values.shape[:2])
         frequencies = columns["frequency"][(hits | beside) & (columns["frequency"] > 0.0)]
-        return _of_samples(
-            hits.reshape(values.shape[:2]),
-            unstable_elsewhere=float(beside.mean()),
-            squeal_frequency=_median(frequencies),
-            unstable=unstable,
-        )
+        return _of_samples(hits.reshape(values.shape[:2]), frequencies, unstable, float(beside.mean()))
 
     advice = [
         replace(change, squeal=squeal_of(change) if change.to is not None else None) for change in report.advice

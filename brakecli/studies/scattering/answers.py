@@ -10,7 +10,6 @@ from brakecli.solver.arrays import Floats
 
 SHARES: tuple[float, ...] = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Shares of the samples below the quantiles that are reported."""
-_RESAMPLED = 200  # times, for what chance makes of indices
 
 
 @dataclass(frozen=True)
@@ -70,7 +69,8 @@ class Indices:
         first, total = _indices(answers)
         rng = np.random.default_rng([seed, len(names)])
         many = answers.shape[1]
-        again = np.array([_indices(answers[:, rng.integers(many, size=many)]) for _ in range(_RESAMPLED)])
+        # what chance makes of them, by samples of the samples
+        again = np.array([_indices(answers[:, rng.integers(many, size=many)]) for _ in range(200)])
         half = stats.norm.ppf(0.5 + 0.5 * LEVEL)
         errors = half * np.std(again[:, 1], axis=0)
         together = total - first > half * np.std(again[:, 1] - again[:, 0], axis=0)

@@ -7,11 +7,7 @@ from brakecli.errors import RefusedError, found_text
 from brakecli.solver.arrays import Floats
 from brakecli.studies.scattering.study import SCRAMBLINGS, Study
 
-_LEAST = 2.0**-53  # a probability: a normal value has no end
 _MOST_FOR_INDICES = 1 << 12  # samples of each of the two sets that indices compare
-SAMPLE_BYTES = 450.0
-VALUE_BYTES = 50.0
-"""Memory that a sample takes, and a value of one, about."""
 MOST_SAMPLES = 1_000_000
 """Samples of a study, a choice: so many know a probability to a thousandth."""
 MOST_VALUES = 20_000_000
@@ -75,8 +71,9 @@ def _refuse_many(study: Study) -> None:
 
 def _values(study: Study, parts: Floats) -> Floats:
     """Values of the parameters by probabilities; correlated by their normal scores (a Gaussian copula)."""
-    parts = np.clip(parts, _LEAST, 1.0 - _LEAST)
+    least = 2.0**-53  # a normal value has no end
+    parts = np.clip(parts, least, 1.0 - least)
     if study.correlation is not None:
         parts = stats.norm.cdf(stats.norm.ppf(parts) @ np.linalg.cholesky(np.array(study.correlation)).T)
-        parts = np.clip(parts, _LEAST, 1.0 - _LEAST)
+        parts = np.clip(parts, least, 1.0 - least)
     return np.stack([law.values(parts[..., n]) for n, law in enumerate(study.parameter)], axis=-1)

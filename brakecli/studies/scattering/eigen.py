@@ -2,7 +2,6 @@
 
 import math
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ def asking(plan: Plan, band: tuple[float, ...] | None) -> Compute:
     return partial(_compute, plan, band)
 
 
-def ask(engine: Engine, count: int, progress: Counted) -> NDArray[Any]:
+def ask(engine: Engine, count: int, progress: Counted) -> NDArray[np.void]:
     """The answers of all samples, in their order."""
     answers = np.zeros(count, ASKED)
     finished = np.zeros(count, np.bool_)

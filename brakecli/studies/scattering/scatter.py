@@ -24,7 +24,7 @@ from brakecli.studies.runs.limits import FILE_BYTES
 from brakecli.studies.runs.plausible import implausible
 from brakecli.studies.runs.run import origin
 from brakecli.studies.scattering.answers import Indices, quantiles
-from brakecli.studies.scattering.draw import SAMPLE_BYTES, VALUE_BYTES, for_indices, has_indices, sample_values
+from brakecli.studies.scattering.draw import for_indices, has_indices, sample_values
 from brakecli.studies.scattering.eigen import ask, asking
 from brakecli.studies.scattering.study import SCRAMBLINGS, LoadedStudy, Study
 from brakecli.studies.sweeps.driver import choose_engine, crew, sweep
@@ -34,13 +34,6 @@ from brakecli.studies.sweeps.point_list import GIVEN, Listed
 from brakecli.studies.sweeps.result import SweepReport, unit
 from brakecli.studies.sweeps.size import WORKER_BYTES, WORKER_WORK, Size, size_of
 from brakecli.studies.sweeps.workers.task import Compute, Engine
-
-_SMOOTH_WORK = 4e-4
-_ROUGH_WORK = 0.1
-"""What the eigenvalues of a sample take, about."""
-_COLUMNS = 6  # of eight bytes that a file has beside its parameters
-_CRITICAL = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION, "method": "eigenvalue"}
-
 
 ELSEWHERE = {True: "are unstable outside that band", False: "are unstable without vibration"}
 """What is said of samples that are unstable, but do not squeal: where there is a band, and where there is none."""
@@ -148,12 +141,13 @@ def draw(loaded: LoadedStudy) -> Drawing:
     others = for_indices(study) if has_indices(study) else None
     beside = others is not None and study.method == "run" and study.indices_of != "squeal"
     together = [values] if others is None or beside else [values, others]
-    tables = {"critical": _CRITICAL} if study.method == "run" else {}
+    friction = {"parameter": "friction.coefficient", "lower": 0.0, "upper": LARGEST_FRICTION}
+    tables: dict[str, object] = {"critical": {**friction, "method": "eigenvalue"}} if study.method == "run" else {}
     apart = _sweep(loaded, [others]) if others is not None and beside else None
     return Drawing(values, others, _sweep(loaded, together, tables), apart)
 
 
-def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, Any] | None = None) -> LoadedSweep:
+def _sweep(loaded: LoadedStudy, sets: list[Floats], tables: dict[str, object] | None = None) -> LoadedSweep:
     """The samples as the points of a sweep."""
     columns = loaded.study.columns(np.concatenate([values.reshape(-1, values.shape[-1]) for values in sets]))
     listed = Listed.of([*columns], columns.values())
@@ -225,7 +219,7 @@ def scatter(
 def engine_for(
     plan: Plan,
     jobs: int | None = None,
-    scheduler: Any = None,
+    scheduler: object = None,
     scheduler_file: str | None = None,
     *,
     in_caller: bool = False,
@@ -241,7 +235,8 @@ def engine_for(
 
 def _few(plan: Plan) -> bool:
     """Whether the eigenvalues of all samples take less time than workers take to start."""
-    return plan.points * (_SMOOTH_WORK if system_of(plan.case({})).smooth else _ROUGH_WORK) < WORKER_WORK
+    of_sample = 4e-4 if system_of(plan.case({})).smooth else 0.1  # about
+    return plan.points * of_sample < WORKER_WORK
 
 
 def size_of_study(loaded: LoadedStudy, drawing: Drawing) -> Size:
@@ -255,8 +250,8 @@ def size_of_study(loaded: LoadedStudy, drawing: Drawing) -> Size:
     return Size(
         points=plan.points,
         workers=workers,
-        memory=WORKER_BYTES * (workers + 1) + SAMPLE_BYTES * samples + VALUE_BYTES * plan.points * keys,
-        file_size=FILE_BYTES + 8.0 * samples * (len(loaded.study.parameter) + _COLUMNS),
+        memory=WORKER_BYTES * (workers + 1) + 450.0 * samples + 50.0 * plan.points * keys,
+        file_size=FILE_BYTES + 8.0 * samples * (len(loaded.study.parameter) + 6),  # columns beside the parameters
         implausible=tuple(implausible(system_of(loaded.base.case))),
     )
 

@@ -5,12 +5,13 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, NamedTuple
 
 import numpy as np
 import tomli_w
 from pydantic import Field, ValidationError
 from scipy import stats
+from scipy.stats.distributions import rv_frozen
 
 from brakecli.analysis.stability.advice import numbers
 from brakecli.case import wording
@@ -23,11 +24,21 @@ from brakecli.solver.arrays import Floats
 
 SCRAMBLINGS = 8
 """Sequences of a study, each with its own scrambling: what they differ by gives the intervals."""
-_LIMIT = 3.0  # deviations from the mean to a limit, where only limits are given: 99.7 % lie between
-_RARE = 1.35e-3  # probability beyond three deviations of a normal distribution
-_LEAST_EIGENVALUE = 1e-9
-_LEAST_KEPT = 1e-12  # probability between limits
 _NUMBERS = ("low", "high", "mean", "deviation", "tolerance_percent")
+
+
+class _Law(NamedTuple):
+    """A distribution, and the probabilities below both ends of what is kept of it, or above them."""
+
+    distribution: rv_frozen
+    first: float
+    last: float
+    above: bool
+
+    @property
+    def kept(self) -> float:
+        """The probability of what is kept."""
+        return abs(self.last - self.first)
 
 
 class Parameter(Table):
@@ -90,10 +101,8 @@ class Parameter(Table):
         )
         positive = all(value is None or value > 0.0 for value in (low, self.mean))
         cut = not bounded and None not in (self.mean, self.deviation, self.low, self.high)
-        if cut and sound and (normal or positive):
-            _, first, last, _ = self._law
-            if not abs(last - first) > _LEAST_KEPT:
-                yield self.wrong("low", "and high lie where no value falls", "take limits nearer to the mean")
+        if cut and sound and (normal or positive) and not self._law.kept > 1e-12:
+            yield self.wrong("low", "and high lie where no value falls", "take limits nearer to the mean")
         if self.distribution == "lognormal":
             for name in ("low", "mean"):
                 value = getattr(self, name)
@@ -114,7 +123,7 @@ class Parameter(Table):
         limits = {bound: getattr(self, bound) for bound in ("low", "high", "mean")}
         values = {bound: value for bound, value in limits.items() if value is not None}
         for where, value in list({name: 0.0}.items() if unknown else values.items())[:2]:
-            data: dict[str, Any] = {}
+            data: dict[str, object] = {}
             put(data, path, value, Case, kept=())
             try:
                 Case.model_validate(data)
@@ -154,8 +163,7 @@ class Parameter(Table):
         raise CaseError([self.wrong("tolerance_percent", f"is part of nothing: {what}", remedy)])
 
     @cached_property
-    def _law(self) -> tuple[Any, float, float, bool]:
-        """The distribution, the probabilities below both ends of what is kept of it, or, if so, above them."""
+    def _law(self) -> "_Law":
         low, high, mean, deviation = (getattr(self, name) for name in _NUMBERS[:4])
         uniform, normal = (self.distribution == name for name in ("uniform", "normal"))
         bounded = uniform or self.distribution == "triangular"
@@ -171,7 +179,7 @@ class Parameter(Table):
         elif mean is None:
             ends = (low, high) if normal else (math.log(low), math.log(high))
             middle = 0.5 * (ends[0] + ends[1])
-            spread = (ends[1] - ends[0]) / (2.0 * _LIMIT)
+            spread = (ends[1] - ends[0]) / 6.0  # three deviations to each limit: 99.7 % lie between
             law = stats.norm(middle, spread) if normal else stats.lognorm(spread, scale=math.exp(middle))
         elif normal:
             law = stats.norm(mean, deviation)
@@ -179,10 +187,10 @@ class Parameter(Table):
             spread = math.sqrt(math.log1p((deviation / mean) ** 2))
             law = stats.lognorm(spread, scale=mean * math.exp(-0.5 * spread**2))
         if bounded or whole:
-            return law, 0.0, 1.0, False
+            return _Law(law, 0.0, 1.0, False)
         above = bool(low > law.median())  # probabilities above are exact there; those below are 1 but for rounding
         ends = (law.sf(low), law.sf(high)) if above else (law.cdf(low), law.cdf(high))
-        return law, float(ends[0]), float(ends[1]), above
+        return _Law(law, float(ends[0]), float(ends[1]), above)
 
     def values(self, parts: Floats) -> Floats:
         """The values below which it lies with these probabilities."""
@@ -192,9 +200,10 @@ class Parameter(Table):
 
     def beside(self, path: str, own: float) -> str:
         """What is said of a drawing whose own value lies where next to none of the samples do; empty elsewhere."""
-        law = self._law[0]
-        low = float(law.ppf(_RARE)) if self.low is None else self.low
-        high = float(law.isf(_RARE)) if self.high is None else self.high
+        law = self._law.distribution
+        rare = 1.35e-3  # what lies beyond three deviations of a normal distribution
+        low = float(law.ppf(rare)) if self.low is None else self.low
+        high = float(law.isf(rare)) if self.high is None else self.high
         if low <= own <= high:
             return ""
         return f"{path}: the case has {own:.4g}, but the study scatters it between {low:.4g} and {high:.4g}"
@@ -253,7 +262,7 @@ class Study(OverCase):
             matrix = np.array(rows)
             if not (np.diag(matrix) == 1.0).all() or not (matrix == matrix.T).all():
                 what = "is not symmetric with ones on its diagonal"
-            elif not np.linalg.eigvalsh(matrix)[0] > _LEAST_EIGENVALUE:
+            elif not np.linalg.eigvalsh(matrix)[0] > 1e-9:  # what is less may be rounding
                 what = "contradicts itself: no quantities correlate so"
         if what:
             yield Problem(

@@ -7,7 +7,7 @@ such a gap between them have one attractor, whatever their order.
 """
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
     from brakecli.analysis.probability import Probability
 
 SAME_AMPLITUDE = 0.05  # part by which amplitudes of the same motion may differ: a settled one is known to that
-_SAME_FREQUENCY = 0.01  # the same of frequencies: within a settled part each drifts by half of that at most
-_SAME_PART = 0.05  # of the cycle, by which the time in a phase may differ where amplitudes do by that part
 _NUMBERS = ("amplitude", "frequency", "stick_fraction", "contact_loss_fraction")
 
 
@@ -103,14 +101,18 @@ def _most(texts: NDArray[np.bytes_]) -> str:
 
 
 def _comparable(values: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Numbers of motions in units of what the same motion may differ by."""
+    """Numbers of motions in units of what the same motion may differ by.
+
+    Within a settled part each frequency drifts by half of its unit at most. The time in a phase may differ by that
+    part of the cycle by which amplitudes do.
+    """
     with np.errstate(invalid="ignore"):
         sizes = np.log(np.maximum(np.nan_to_num(values[:2]), np.finfo(float).tiny))
-    scales = np.log1p([[SAME_AMPLITUDE], [_SAME_FREQUENCY]])
-    return np.concatenate([sizes / scales, values[2:] / _SAME_PART])
+    scales = np.log1p([[SAME_AMPLITUDE], [0.01]])
+    return np.concatenate([sizes / scales, values[2:] / SAME_AMPLITUDE])
 
 
-def _grouped(kinds: NDArray[Any], apart: NDArray[np.float64]) -> NDArray[np.int64]:
+def _grouped(kinds: NDArray[np.int_], apart: NDArray[np.float64]) -> NDArray[np.int64]:
     """The group of each point, from 0: first by kind, then split at every gap above 1 until there is none.
 
     Groups are counted by kind, and then by the medians of their numbers, amplitudes first.

@@ -42,9 +42,6 @@ from brakecli.studies.sweeps.windows_of_branch import PART, explored, on_waves
 SCANNED_BY_EIGENVALUES = 129
 SCANNED_WHERE_OPEN = 17  # by eigenvalues where surfaces open: their mean stiffness takes time
 _OF_SURFACES = ("contact.half_length", "contact.nodes", "contact.evaluator", "roughness.")
-_NEAR = 1e-3  # of the range, by which a stable value lies beside a change that tells its error; a choice
-_OPENS = 0.999  # part of the stiffness of the whole pad, below which it opens
-_FINEST = 1e-9  # bracket of a change over the requested one, where evaluations are cheap
 
 
 def search(critical: Critical, line: Line) -> Search:
@@ -148,8 +145,8 @@ def _by_eigenvalues(
         return [Rounded(1.0 + MARGIN - spectral_radius(system, equilibrium.stiffness, system.coefficients.phi))]
 
     first = steady_at(critical.lower)
-    opens = first is not None and first[1].stiffness < _OPENS * first[0].contact_stiffness
-    width = critical.tolerance * (PART if opens else _FINEST)
+    opens = first is not None and first[1].stiffness < 0.999 * first[0].contact_stiffness
+    width = critical.tolerance * (PART if opens else 1e-9)  # otherwise evaluations are cheap
 
     def scanned(count: int) -> list[float]:
         values: list[float] = np.linspace(critical.lower, critical.upper, count).tolist()
@@ -159,7 +156,7 @@ def _by_eigenvalues(
         """By which the mean over the waves leaves a change open, as far as there is steady sliding."""
         if system_of(case_at(change.value)).smooth:
             return 0.0
-        apart = _NEAR * (critical.upper - critical.lower)
+        apart = 1e-3 * (critical.upper - critical.lower)  # to a stable value that tells the error; a choice
         near = change.value - apart if change.lost else change.value + apart
         near = min(max(near, critical.lower), critical.upper)
 

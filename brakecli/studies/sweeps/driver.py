@@ -10,7 +10,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,14 +28,6 @@ from brakecli.studies.sweeps.size import Size, refuse_sweep, size_of
 from brakecli.studies.sweeps.workers.local import CallerEngine, LocalEngine
 from brakecli.studies.sweeps.workers.task import Compute, Engine, Task, compute_units
 
-TASK_SECONDS = 0.2  # of work in a task, so that handing it out costs little,
-TASKS_A_SECOND = 100.0  # and more where workers would ask for more tasks than this; a scheduler hands out 500
-LONGEST_TASK = 1.0  # s of work, in the middle of long sweeps: a task costs a cluster some 5 ms of a core,
-PART_OF_REST = 0.01  # and no more than this part of what a worker has still to do: all end at about the same time
-# points, for so many workers; in proportion for more
-LARGEST_TASK = 1000
-FEW_WORKERS = 100
-
 
 class TaskQueue:
     """Cuts what is not finished into tasks, of a size by the time that units have taken so far."""
@@ -51,9 +42,11 @@ class TaskQueue:
         self._waiting = sum(task.size for task in self._tasks)
         self._size = size
         self._least = least
-        self._task_seconds = max(TASK_SECONDS, workers / TASKS_A_SECOND)
-        self._part_of_rest = PART_OF_REST / workers
-        self._most = max(LARGEST_TASK, LARGEST_TASK * workers // FEW_WORKERS)
+        # Handing out a task costs little beside 0.2 s of work. A scheduler hands out 500 a second: they are longer
+        # where workers would ask for more than 100.
+        self._task_seconds = max(0.2, workers / 100.0)
+        self._part_of_remaining = 0.01 / workers  # so that all end at about the same time
+        self._most = max(1000, 10 * workers)  # points
         # computed so far
         self.seconds = 0.0
         self.units = 0
@@ -64,9 +57,10 @@ class TaskQueue:
             return None
         task = self._tasks.popleft()
         rate = self.units / max(self.seconds, 1e-9)
-        by_rest = int(min(LONGEST_TASK * rate, self._part_of_rest * self._waiting, self._most))
+        # In the middle of long sweeps it is 1 s of work: a task costs a cluster some 5 ms of a core.
+        by_remaining = int(min(rate, self._part_of_remaining * self._waiting, self._most))
         by_time = math.ceil(min(self._task_seconds * rate, self._most))
-        size = min(task.size, self._size or max(self._least, by_time, by_rest))
+        size = min(task.size, self._size or max(self._least, by_time, by_remaining))
         self._waiting -= size
         if size < task.size:
             self._tasks.appendleft(Task(task.first + size, task.size - size))
@@ -89,7 +83,7 @@ class TaskQueue:
 def choose_engine(
     plan: Plan,
     jobs: int | None,
-    scheduler: Any = None,
+    scheduler: object = None,
     scheduler_file: str | None = None,
     *,
     in_caller: bool = False,

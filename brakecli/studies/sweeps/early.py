@@ -13,7 +13,7 @@ steady sliding, a settled part that is too short), there is no early verdict, an
 
 import math
 from itertools import groupby
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -34,14 +34,6 @@ from brakecli.solver.motion.flow import Orbit, Pursuit, SmoothFlow
 from brakecli.solver.system import System
 from brakecli.studies.runs.certificate import ROUNDING, Certificate
 from brakecli.studies.runs.settled import Judged
-
-_SETTLED = 0.02  # of the size of a cycle: a motion so near to its orbit is settled
-_POWERS = 10.0  # of e, by which what is left then fades until the end: drift is seen no more
-_SETTLED_PART = 0.35  # of the run, at least: a quarter and the width of windows
-_CYCLES = 5.0  # in a window of its envelope: of fewer, windows differ by where they cut the cycles
-_SAMPLES = 40.0  # in a cycle, so that its shape is seen
-_GRAZES = 0.01  # of the wheel's speed: nearer to it, rounding may decide whether the shoe sticks
-_SEEN = 1.2  # samples beside steady sliding: one falls into each time, also where the orbit is not reached yet
 
 
 class Ending(NamedTuple):
@@ -127,24 +119,29 @@ def _linear(system: System, theory: Linear, motion: Pursuit) -> tuple[Verdict, l
     if theory.direction > 0:
         answers = answers._replace(time_to_limit=theory.seconds_to_limit(end, last))
     decision = decide(answers, Thresholds())
-    evidence = {"row": decision.row, "growth_rate": theory.mode.growth}
-    numbers: dict[str, Any] = {
-        "stick_fraction": 0.0,
-        "contact_loss_fraction": 0.0,
-        "mean_friction_force": force,
-        "braking_torque": system.radius * force,
-        "settled_from": start,
-        "settled": False,
-        "evidence": evidence,
-        "remaining": math.exp(theory.mode.growth * (end - reached)),
-    }
+
+    def verdict(size: float, first: float | None = None) -> Verdict:
+        return Verdict(
+            decision,
+            amplitude=size,
+            stick_fraction=0.0,
+            contact_loss_fraction=0.0,
+            mean_friction_force=force,
+            braking_torque=system.radius * force,
+            settled_from=start,
+            settled=False,
+            evidence={"row": decision.row, "growth_rate": theory.mode.growth},
+            amplitude_first=first,
+            remaining=math.exp(theory.mode.growth * (end - reached)),
+        )
+
     if decision.regime is not Regime.DAMPED:
-        return Verdict(decision, amplitude(start, end), **numbers), last.tolist()
+        return verdict(amplitude(start, end)), last.tolist()
     first, late = (index * system.interval for index in tenths(system.samples + 1))
     first -= system.interval  # its last sample
     before = _swung(system, theory, min(reached, first))
     early = amplitude(reached, first, *before) if reached < first else 0.5 * (before[1] - before[0])
-    return Verdict(decision, amplitude(late, end), amplitude_first=early, **numbers), last.tolist()
+    return verdict(amplitude(late, end), early), last.tolist()
 
 
 def _swung(system: System, theory: Linear, seconds: float) -> tuple[float, float]:
@@ -172,20 +169,22 @@ def _cycle(
     rate = end.rate or 0.0
     duration = system.sampled_duration
     interval = system.interval
-    fades = math.log(max(float(way.away) / _SETTLED, 1.0)) / rate
+    fades = math.log(max(float(way.away) / 0.02, 1.0)) / rate  # until it is so near to its orbit, over its size
     start = float(way.fell[0]) + fades
     lasting = duration - start
     hidden = (
-        lasting < _SETTLED_PART * duration
-        or duration < _CYCLES * WINDOWS * orbit.period
-        or orbit.period < _SAMPLES * interval
-        or _longest_away(orbit, int(way.sliding)) < _SEEN * interval
-        or (orbit.stick_fraction == 0.0 and abs(motion.fastest - 1.0) < _GRAZES)
+        rate * lasting < 10.0  # powers of e by which what is left then fades until the end: else drift is seen
+        or lasting < 0.35 * duration  # a quarter, and the width of windows
+        or duration < 5.0 * WINDOWS * orbit.period  # windows differ by where they cut the cycles
+        or orbit.period < 40.0 * interval  # its shape is not seen
+        # one sample falls into each time beside steady sliding, also where the orbit is not reached yet
+        or _longest_away(orbit, int(way.sliding)) < 1.2 * interval
+        # so near to the wheel's speed rounding may decide whether the shoe sticks
+        or (orbit.stick_fraction == 0.0 and abs(motion.fastest - 1.0) < 0.01)
         or motion.path.beaten.tolist() != [1, 1]  # more than one fall of vx that counts
+        or is_undamped(system.coefficients)  # no motion is sure to stay
     )
-    if (
-        rate * lasting < _POWERS or hidden or is_undamped(system.coefficients)
-    ):  # without dashpots none is sure to stay
+    if hidden:
         return None
     answers = Answers(
         duration=duration,

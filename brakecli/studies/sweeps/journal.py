@@ -33,11 +33,7 @@ from brakecli.studies.sweeps.workers.task import fingerprint
 
 _PLACE = struct.Struct("<qqI")  # first unit, units, bytes of their records, which are packed
 _HEAD = struct.Struct("<qqII")  # the place, checksum of the place and the packed records
-_LEVEL = 1  # of packing: texts are alike, and numbers hardly smaller at the others
-_AT_ONCE = 1 << 14  # points read at a time
-_LONGEST_HEADER = 5_000_000
 _FIRST_KEY = b"brakecli_version"
-MOST_DIFFERENCES = 5
 
 
 class Journal:
@@ -59,12 +55,12 @@ class Journal:
         self._longest = {name: 1 for name in self.kind.names or () if self.kind[name].kind == "S"}  # bytes
         self._block = 0, b""  # read last: where it begins, and its records
         # Lines read last: the first and the last, and their records.
-        self._slab: tuple[int, int, NDArray[Any]] | None = None
+        self._slab: tuple[int, int, NDArray[np.void]] | None = None
 
     def add(self, first: int, records: bytes) -> None:
         """Append the records of finished units, which are sound."""
         count = len(records) // self._unit_bytes
-        packed = zlib.compress(records, _LEVEL)
+        packed = zlib.compress(records, 1)  # texts are alike, and numbers hardly smaller at other levels
         extent = first, count, len(packed)
         offset = self._file.seek(0, os.SEEK_END)
         try:
@@ -78,12 +74,12 @@ class Journal:
         self._note(extent, offset + _HEAD.size, records, packed)
 
     @property
-    def stored(self) -> np.dtype[Any]:
+    def stored(self) -> np.dtype[np.void]:
         """The record of a point in a result: its texts as long as the longest of them."""
         lengths = {name: f"S{length}" for name, length in self._longest.items()}
         return np.dtype([(name, lengths.get(name, self.kind[name])) for name in self.kind.names or ()])
 
-    def read(self, start: int, stop: int) -> NDArray[Any]:
+    def read(self, start: int, stop: int) -> NDArray[np.void]:
         """The records of the places start … stop - 1 of the result, in its order; no unit may be missing."""
         plan = self.plan
         if plan.followed is None:
@@ -98,11 +94,12 @@ class Journal:
         begin = first * plan.unit_length
         return self._slab[2][start - begin : stop - begin]
 
-    def blocks(self) -> Iterator[tuple[int, NDArray[Any]]]:
+    def blocks(self) -> Iterator[tuple[int, NDArray[np.void]]]:
         """All records in the order of the result, some at a time: the place of the first, and they."""
         points = len(self.finished) * self.plan.unit_length
-        for start in range(0, points, _AT_ONCE):
-            yield start, self.read(start, min(start + _AT_ONCE, points))
+        at_once = 1 << 14
+        for start in range(0, points, at_once):
+            yield start, self.read(start, min(start + at_once, points))
 
     def column(self, name: str) -> NDArray[Any]:
         """A field of all records, in the shape of the grid; every unit has to be finished.
@@ -115,7 +112,7 @@ class Journal:
             column = column[..., : max(1, int(np.isfinite(column).sum(axis=-1).max()))]
         return column
 
-    def _units(self, first: int, last: int) -> NDArray[Any]:
+    def _units(self, first: int, last: int) -> NDArray[np.void]:
         """The records of some units, in their order."""
         length = self.plan.unit_length
         kind = self.stored
@@ -148,7 +145,7 @@ class Journal:
     def begin(self, *, force: bool) -> None:
         """Take up what an earlier run has left, or write the header of a new journal."""
         own = identity(self.plan)
-        header = self._file.read(_LONGEST_HEADER)
+        header = self._file.read(5_000_000)  # of no header
         header = header[: header.find(b"\n") + 1] or header
         if not (refusal := _refusal(header, own)):
             self._read_blocks(len(header))
@@ -236,7 +233,7 @@ def _checksum(extent: tuple[int, int, int], packed: bytes) -> int:
     return zlib.crc32(packed, zlib.crc32(_PLACE.pack(*extent)))
 
 
-def identity(plan: Plan) -> dict[str, Any]:
+def identity(plan: Plan) -> dict[str, object]:
     """What makes a sweep this one: every key of the sweep and its case, and the versions it is computed with.
 
     Of the measured profiles that points need, names and contents count: a folder may have been moved.
@@ -253,7 +250,7 @@ def identity(plan: Plan) -> dict[str, Any]:
     return {**fingerprint(), **case, **measured, **{f"sweep {key}": value for key, value in sweep.items()}}
 
 
-def _refusal(header: bytes, own: Mapping[str, Any]) -> str:
+def _refusal(header: bytes, own: Mapping[str, object]) -> str:
     """Why a journal that begins with a line belongs to another sweep; empty where it belongs to this one."""
     try:
         there = json.loads(header)
@@ -269,6 +266,6 @@ def _refusal(header: bytes, own: Mapping[str, Any]) -> str:
         {key: value_text(entries.get(key, "not set")).strip('"') for key in keys} for entries in (there, own)
     )
     differences = [f"{key} was {were[key]}, is {are[key]}" for key in keys]
-    differences[MOST_DIFFERENCES:] = [f"and {more} more"] if (more := len(keys) - MOST_DIFFERENCES) > 0 else []
+    differences[5:] = [f"and {len(keys) - 5} more"] * (len(keys) > 5)
     remedy = f"undo the change to go on, or start again with {argument('force')}, which drops the finished points"
     return f"holds finished points of another sweep: {', '.join(differences)}; {remedy}"

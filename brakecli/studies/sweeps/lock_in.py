@@ -32,8 +32,6 @@ from brakecli.studies.sweeps.plan import Plan
 from brakecli.studies.sweeps.result import unit
 from brakecli.studies.sweeps.tables import Axis
 
-_ZERO = 1e-12  # of the range of the key: a critical value below that is 0, but for rounding
-
 
 @dataclass(frozen=True)
 class LockIn:
@@ -98,7 +96,8 @@ def lock_in(loaded: LoadedCase, axis: Axis, option: str, progress: Counted) -> L
 
     inner = middles(case, list(axis.parameter), values[0], values[-1]) if moving else []
     for change in changes(signs_at, sorted({*moving, *inner})):
-        critical.append(change.value if abs(change.value) > _ZERO * abs(values[-1] - values[0]) else 0.0)
+        rounding = 1e-12 * abs(values[-1] - values[0])
+        critical.append(change.value if abs(change.value) > rounding else 0.0)
     if values[-1] < values[0]:
         critical.reverse()
     return LockIn(axis, entries, critical)

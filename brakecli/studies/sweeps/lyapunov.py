@@ -21,15 +21,10 @@ from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search, of_changes
 from brakecli.studies.sweeps.windows_of_branch import in_full_contact
 
-VALUES = 33  # of the parameter, between which a change is looked for
-EDGES = 4  # halvings towards the ends of a range in which the answer is not known
 # batches of a long run, segments of a batch, segments before the first
 BATCHES = 8
 BATCH = 4
 TRANSIENT = 16
-FEWEST = 4  # batches without which an error is not known
-DEPARTED = 2.0  # times as far from steady sliding as roughness alone takes a motion
-CERTAIN = 3.5  # standard errors of the mean of eight batches: 99 % of Student's distribution
 
 Steady = Callable[[float], tuple[System, SteadySliding] | None]
 
@@ -71,13 +66,13 @@ def exponent(system: System, equilibrium: SteadySliding, linear: bool = False) -
             return None
         state = run.state
         away.append(float(np.abs((state - begin) * scales).max()))
-        if k >= TRANSIENT and away[-1] > DEPARTED * max(away[: TRANSIENT // 2]):
+        if k >= TRANSIENT and away[-1] > 2.0 * max(away[: TRANSIENT // 2]):  # roughness alone takes it less far
             break
         maps.append(run.derivative * (scales[:, None] / scales))
         frame, triangle = np.linalg.qr(maps[-1] @ frame)
         logs.append(math.log(max(abs(float(triangle[0, 0])), 1e-300)))
     batches = (len(logs) - TRANSIENT) // BATCH
-    if batches < FEWEST:
+    if batches < 4:  # without which an error is not known
         return None
     if linear:
         half = len(maps) // 2
@@ -86,7 +81,7 @@ def exponent(system: System, equilibrium: SteadySliding, linear: bool = False) -
     means = np.reshape(logs[TRANSIENT : TRANSIENT + batches * BATCH], (batches, BATCH)).mean(axis=1) / span
     longer = means[batches % 2 :].reshape(-1, 2).mean(axis=1)  # what wanders slowly is alike in neighbours
     off = max(float(rates.std(ddof=1)) / math.sqrt(len(rates)) for rates in (means, longer))
-    return Rounded(float(means.mean()), CERTAIN * off)
+    return Rounded(float(means.mean()), 3.5 * off)  # of eight batches: 99 % of Student's distribution
 
 
 def _growth(maps: list[Floats]) -> float:
@@ -109,8 +104,9 @@ def by_exponents(critical: Critical, steady_at: Steady) -> Search:
         measured = by_theory if certain else exponent(*steady, linear=by_theory is not None)
         return measured.positive if measured else None
 
-    values = np.linspace(critical.lower, critical.upper, VALUES).tolist()
+    values = np.linspace(critical.lower, critical.upper, 33).tolist()
     if all(steady_at(value) is None for value in values):
         return Search(Outcome.NO_SLIDING)
-    changes = between_known(unstable, values, critical.tolerance, EDGES)
+    # four halvings towards the ends of a range in which the answer is not known
+    changes = between_known(unstable, values, critical.tolerance, 4)
     return of_changes(critical, unstable(values[0]), changes)

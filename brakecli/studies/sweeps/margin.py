@@ -11,27 +11,24 @@ from brakecli.errors import CaseError, RefusedError
 from brakecli.studies.runs.limits import within_range
 from brakecli.studies.sweeps.plan import Plan
 
-MOST_POINTS = 10**5
-"""Points of a sweep whose settings are listed to find these cases; a choice."""
-MOST = 2500
-MOST_ROUGH = 64
-"""Cases whose critical friction is looked for, smooth and rough ones; a sweep that needs more gets no line."""
 _FRICTION = ("friction", "coefficient")
 
 
 def margins(plan: Plan) -> NDArray[np.float64] | None:
     """Critical friction less friction at every point of the grid, by eigenvalues; None where it would take long.
 
-    What is never stable is critical at 0, what no friction makes unstable at the largest friction searched. With a
-    wheel at rest, or numbers out of range, it is NaN.
+    That is with more than 100 000 points, whose settings would all be listed, or where critical friction would be
+    looked for in more than 2500 cases, 64 of rough surfaces: choices. What is never stable is critical at 0, what
+    no friction makes unstable at the largest friction searched. With a wheel at rest, or numbers out of range, it
+    is NaN.
     """
-    settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= MOST_POINTS else []
+    settings = [plan.settings(point) for point in range(prod(plan.shape))] if plan.points <= 100_000 else []
     others = {
         tuple(value for path, value in setting.items() if path != _FRICTION): setting for setting in settings
     }
     try:
         rough = not all(system_of(plan.case(setting)).smooth for setting in settings[:: max(1, len(settings) - 1)])
-        if not others or len(others) > (MOST_ROUGH if rough else MOST):
+        if not others or len(others) > (64 if rough else 2500):
             return None
         critical_of = {key: _critical(plan, setting) for key, setting in others.items()}
         own = plan.case({}).friction.coefficient

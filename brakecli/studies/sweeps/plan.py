@@ -76,7 +76,7 @@ class Plan:
         ]
         return self.followed is None and {key_path(text)[0] for text in keys} == {"initial"}
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[object, ...]:
         """Travel as two texts, the measured profiles and the listed points."""
         return plan_of, (self.sweep_text, self.case_text, tuple(self.records.items()), self.listed)
 
@@ -126,7 +126,7 @@ class Plan:
         return ()
 
 
-def _valid_tables(data: dict[str, Any]) -> Iterator[tuple[str, Table]]:
+def _valid_tables(data: dict[str, object]) -> Iterator[tuple[str, Table]]:
     """The tables of a case that are right by themselves."""
     for name, table in data.items():
         if (kind := tables_within(Case).get((name,))) is not None:
@@ -134,7 +134,7 @@ def _valid_tables(data: dict[str, Any]) -> Iterator[tuple[str, Table]]:
                 yield name, kind.model_validate(table)
 
 
-def _tables(data: dict[str, Any]) -> dict[str, Any]:
+def _tables(data: dict[str, object]) -> dict[str, object]:
     """The data of a table whose tables, but no lists, are copies."""
     return {key: _tables(value) if isinstance(value, dict) else value for key, value in data.items()}
 
@@ -187,7 +187,7 @@ def parse_sweep(text: str, name: str, folder: Path, overrides: Sequence[str] = (
     return _checked(sweep, text, name, base, listed)
 
 
-def sweep_of(tables: dict[str, Any], base: LoadedCase, listed: Listed | None = None) -> LoadedSweep:
+def sweep_of(tables: dict[str, object], base: LoadedCase, listed: Listed | None = None) -> LoadedSweep:
     """The sweep of the tables that its file would have, over a case at hand. Raises `CaseError`."""
     text = tomli_w.dumps(tables)
     name = "the sweep"
@@ -243,7 +243,7 @@ def keys_at_top(text: str) -> set[str]:
         return set()
 
 
-def label(value: Any) -> str:
+def label(value: object) -> str:
     """A value of an axis as TOML writes it, but a text without its quotes."""
     if isinstance(value, str):
         return value

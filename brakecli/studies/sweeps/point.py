@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +28,7 @@ OUT_OF_MEMORY = "out of memory; sample less often, or reduce contact.nodes"
 FAULTS = (BrakecliError, FloatingPointError, MemoryError)
 
 
-def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
+def compute(plan: Plan, first: int, count: int) -> NDArray[np.void]:
     """The records of some neighbouring units; those of a line stand in the order of the grid.
 
     Points that do not follow one another are computed side by side as far as they can be, which changes none of
@@ -51,7 +51,7 @@ def compute(plan: Plan, first: int, count: int) -> NDArray[Any]:
     return records
 
 
-def _line(plan: Plan, unit: int) -> NDArray[Any]:
+def _line(plan: Plan, unit: int) -> NDArray[np.void]:
     """The records of a line, in the order of the grid."""
     points = line_points(plan, unit)
     records = np.zeros(len(points), record_type(plan))
@@ -61,7 +61,7 @@ def _line(plan: Plan, unit: int) -> NDArray[Any]:
     return records
 
 
-def followed(plan: Plan, points: Sequence[int]) -> Iterator[NDArray[Any]]:
+def followed(plan: Plan, points: Sequence[int]) -> Iterator[NDArray[np.void]]:
     """The records of points, each of which starts from the end of the one before.
 
     The wheel goes on turning: its waves keep the phases that they have come to.
@@ -133,7 +133,7 @@ def begun(plan: Plan, settings: Settings) -> Begun | Exception:
 
 def computed(
     plan: Plan, point: Begun | Exception, judgement: Judged[Motion] | None = None, theory: Theory | None = None
-) -> tuple[NDArray[Any], PointRun | None]:
+) -> tuple[NDArray[np.void], PointRun | None]:
     """The record of a point and its run, which is None where it was not possible."""
     try:
         if isinstance(point, Exception):

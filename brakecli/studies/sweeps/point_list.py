@@ -8,7 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from io import BufferedReader, TextIOWrapper
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TextIO
 
 from brakecli.case.read import key_path
 from brakecli.case.tables import entries
@@ -25,7 +25,6 @@ MOST_VALUES = 3_000_000
 """Values of a list, keys times points: a choice. One takes up to 100 bytes, here and in each worker."""
 GIVEN = "-"
 """The file of points that come from no file."""
-_AT_ONCE = 1 << 14  # values that go into a checksum
 
 Row = tuple[int, list[str]]
 """The line at which a row ends, and its cells."""
@@ -36,18 +35,19 @@ class Listed:
     """Listed points. Two lists are one and the same where keys and checksum agree."""
 
     keys: tuple[str, ...]
-    columns: tuple[tuple[Any, ...], ...] = field(compare=False)
+    columns: tuple[tuple[object, ...], ...] = field(compare=False)
     checksum: int
     lines: tuple[int, ...] = field(default=(), compare=False)  # where each stands in its file
 
     @classmethod
-    def of(cls, keys: Sequence[str], columns: Iterable[Iterable[Any]], lines: tuple[int, ...] = ()) -> "Listed":
+    def of(cls, keys: Sequence[str], columns: Iterable[Iterable[object]], lines: tuple[int, ...] = ()) -> "Listed":
         """The points whose values stand in the columns of these keys."""
         values = tuple(tuple(column) for column in columns)
         checksum = 0
+        at_once = 1 << 14
         for column in values:
-            for begin in range(0, len(column), _AT_ONCE):
-                checksum = zlib.crc32(repr(column[begin : begin + _AT_ONCE]).encode(), checksum)
+            for begin in range(0, len(column), at_once):
+                checksum = zlib.crc32(repr(column[begin : begin + at_once]).encode(), checksum)
         return cls(tuple(keys), values, checksum, lines)
 
     @property
@@ -95,7 +95,7 @@ def _points(rows: Iterator[Row], name: str) -> Listed:
         if path in paths:
             raise _wrong(f"{key} has two columns", "keep one of them", name, line)
         paths[path] = key
-    columns = [list[Any]() for _ in keys]
+    columns = [list[object]() for _ in keys]
     lines = list[int]()
     for line, cells in rows:
         if len(cells) != len(keys) or "" in cells:
@@ -129,7 +129,7 @@ def _wrong(what: str, remedy: str, name: str, line: int) -> CaseError:
     return CaseError([Problem((), what, remedy, name, line)])
 
 
-def _value(text: str) -> Any:
+def _value(text: str) -> object:
     """What a cell holds: a number, true or false, or a text."""
     for kind in (int, float) if text.isascii() and "_" not in text else ():
         with suppress(ValueError):

@@ -27,7 +27,7 @@ _KNOWN: dict[str, type[StrEnum]] = {"status": Status, "regime": Regime, "excitat
 
 
 @lru_cache(maxsize=4)
-def record_type(plan: Plan) -> np.dtype[Any]:
+def record_type(plan: Plan) -> np.dtype[np.void]:
     """The record of a point of the sweep."""
     return np.dtype([(field.name, field.kind) for field in plan.fields])
 
@@ -54,17 +54,17 @@ def _fits(name: str, values: NDArray[Any]) -> bool:
     return False
 
 
-def blank(kind: np.dtype[Any], status: Status, reason: str) -> NDArray[Any]:
+def blank(kind: np.dtype[np.void], status: Status, reason: str) -> NDArray[np.void]:
     """The record of a point without a result."""
     return filled(kind, {"status": status, "reason": reason, "regime": "undecided", "excitation": "none"})
 
 
-def filled(kind: np.dtype[Any], values: Mapping[str, Any]) -> NDArray[Any]:
+def filled(kind: np.dtype[np.void], values: Mapping[str, object]) -> NDArray[np.void]:
     """A record of some values; missing numbers are NaN."""
     return np.array([tuple(_fitted(kind[name], values.get(name)) for name in kind.names or ())], kind)
 
 
-def _fitted(kind: np.dtype[Any], value: Any) -> Any:
+def _fitted(kind: np.dtype[np.void], value: object) -> object:
     """A value as its place in a record takes it."""
     if isinstance(value, str):  # as many whole characters as fit
         value = value.encode()

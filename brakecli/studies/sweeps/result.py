@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,12 +29,17 @@ from brakecli.studies.sweeps.short_runs import on_short_runs
 from brakecli.studies.sweeps.tables import Axis
 
 MOST_FAILURES = 100
-MOST_AS_JSON = 10_000  # points; of more the file alone holds every number
-_LISTED = 3  # points that are named
-WIDE = 0.1  # of the range, from which on an error bar is named
 _DONE = Status.DONE.encode()
 _NUMBER = re.compile(r"-?\d+(\.\d+)?(e[+-]?\d+)?")  # by which sentences of one kind differ
 _LONGER = re.compile(rf"run at least ({_NUMBER.pattern}) s")
+
+
+class Failure(TypedDict):
+    """A point without a result."""
+
+    point: int
+    parameters: dict[str, object]
+    reason: str
 
 
 class Findings:
@@ -48,7 +53,7 @@ class Findings:
         self.failed = 0
         warnings = 0
         first = ""
-        self.failures: list[dict[str, Any]] = []
+        self.failures = list[Failure]()
         regimes = Counter[bytes]()
         for start, records in journal.blocks():
             failed = np.flatnonzero(records["status"] != _DONE)
@@ -56,7 +61,7 @@ class Findings:
             for index in failed[: MOST_FAILURES - len(self.failures)].tolist():
                 point = start + index
                 reason = records["reason"][index].decode()
-                self.failures.append({"point": point, "parameters": _parameters(plan, point), "reason": reason})
+                self.failures.append(Failure(point=point, parameters=_parameters(plan, point), reason=reason))
             if len(warned) and not warnings:
                 first = records["warning"][warned[0]].decode()
             self.failed = self.failed + len(failed)
@@ -83,7 +88,7 @@ class Findings:
             self.attractors = come_to.attractors
             self.sentences += come_to.sentences
         self.variables: dict[str, Any] | None = None
-        if self.points <= MOST_AS_JSON:
+        if self.points <= 10_000:  # of more the file alone holds every number
             self.variables = {field.name: plain(journal.column(field.name)) for field in plan.fields}
             if self.attractors is not None:
                 self.variables[fields.STARTS[0].name] = plain(self.come_to)
@@ -108,7 +113,7 @@ class SweepReport:
         return self.computed / self.seconds if self.computed and self.seconds else None
 
     @property
-    def axes(self) -> dict[str, Any]:
+    def axes(self) -> dict[str, object]:
         """The parameters and the values of each axis; none where there are too many points."""
         axes = self.loaded.sweep.axis if self.findings.variables is not None else ()
         return {axis.name: {"parameter": axis.parameter, "values": _values(axis)} for axis in axes}
@@ -194,7 +199,7 @@ def _values(axis: Axis) -> list[Any]:
     return [axis.value(index) for index in range(axis.size)]
 
 
-def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
+def _hysteresis(journal: Journal) -> tuple[NDArray[np.int64] | None, list[str]]:
     """Where the motions on the way up and on the way down differ (1), and what to say of it; None without both."""
     if journal.plan.passes != 2:
         return None, []
@@ -216,9 +221,9 @@ def _hysteresis(journal: Journal) -> tuple[NDArray[Any] | None, list[str]]:
     if count and simple and (ends := _ends_of_loop(journal.plan, lasts, done)):
         said.append(f"hysteresis at {count} of {size} points: {ends}")
     elif count:
-        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:_LISTED]]
+        where = [_parameters(journal.plan, int(index)) for index in np.flatnonzero(differ.ravel())[:3]]
         places = "; ".join(", ".join(f"{key} = {label(value)}" for key, value in point.items()) for point in where)
-        more = f"; and {count - _LISTED} more" if count > _LISTED else ""
+        more = f"; and {count - 3} more" if count > 3 else ""
         said.append(f"hysteresis at {count} of {size} points: {places}{more}")
     elif decided:
         those = f" at the {decided} point{'s that are' if decided > 1 else ' that is'} decided"
@@ -280,7 +285,7 @@ def _on_settled(journal: Journal) -> Iterator[str]:
     )
 
 
-def _ends_of_loop(plan: Plan, lasts: NDArray[Any], decided: NDArray[Any]) -> str:
+def _ends_of_loop(plan: Plan, lasts: NDArray[np.bool_], decided: NDArray[np.bool_]) -> str:
     """Where vibration begins and ends on both ways, (2, points), between points that are known.
 
     Empty if on a way it does so more than once, or not at all with every point known.
@@ -299,7 +304,7 @@ def _ends_of_loop(plan: Plan, lasts: NDArray[Any], decided: NDArray[Any]) -> str
     return f"along {', '.join(axis.parameter)} the vibration {said[0]}, and {said[1]}"
 
 
-def _change(lasts: NDArray[Any], is_decided: NDArray[Any], values: list[str]) -> tuple[str, str] | None:
+def _change(lasts: NDArray[np.bool_], is_decided: NDArray[np.bool_], values: list[str]) -> tuple[str, str] | None:
     """What a vibration does once along points in their order, and where; None if this is not known."""
     decided = np.flatnonzero(is_decided)
     changes = np.flatnonzero(np.diff(lasts[decided]))
@@ -335,7 +340,7 @@ def _on_lasting_vibration(journal: Journal, tolerance: float) -> Iterator[str]:
 
 def _on_wide_bars(journal: Journal, lower: float, upper: float) -> Iterator[str]:
     """What is to be done where no critical value is known, or hardly one, and where windows are hardly known."""
-    wide = WIDE * (upper - lower)
+    wide = 0.1 * (upper - lower)
     size = journal.column("status").size
     undecided = int((journal.column("critical_status") == b"undecided").sum())
     unsure = int((np.nan_to_num(journal.column("critical_error"), nan=0.0) > wide).sum())
@@ -369,6 +374,6 @@ def _on_no_dashpots(plan: Plan) -> Iterator[str]:
         yield f"no dashpot acts: {none}; give the links the damping that they have"
 
 
-def _parameters(plan: Plan, index: int) -> dict[str, Any]:
+def _parameters(plan: Plan, index: int) -> dict[str, object]:
     """What the axes set at a point, by its place in a variable of the result."""
     return {".".join(path): value for path, value in plan.settings(index % plan.points).items()}

@@ -16,11 +16,6 @@ from brakecli.studies.runs.limits import within_range
 from brakecli.studies.sweeps.journal import Journal
 from brakecli.studies.sweeps.plan import Plan, label
 
-MOST = 1000
-"""Undecided points that are looked at, some milliseconds each."""
-WORTH = 0.9
-"""A run for some points is named where it is shorter than that for all, by this factor or less."""
-
 
 def on_short_runs(journal: Journal) -> Iterator[str]:
     """Where runs of a followed motion are too short, and how long they should be; on smooth pads.
@@ -40,7 +35,7 @@ def on_short_runs(journal: Journal) -> Iterator[str]:
     undecided = (journal.column("regime") == b"undecided") & (journal.column("status") == b"done")
     amplitudes = journal.column("amplitude").ravel()
     growing = list[tuple[float, float]]()
-    for index in np.flatnonzero(undecided.ravel())[:MOST].tolist():
+    for index in np.flatnonzero(undecided.ravel())[:1000].tolist():  # some milliseconds each
         point = index % plan.points
         theory = _theory(plan, point)
         if theory is None:
@@ -109,7 +104,7 @@ def _where(plan: Plan, growing: list[tuple[float, float]]) -> str:
 
 
 def _remedy(growing: list[tuple[float, float]]) -> str:
-    """The duration that is long enough for all of the points, and the one that is for the first of them."""
+    """The duration that is long enough for all of the points, and that for the first if it is clearly shorter."""
     least, most = (pick(seconds for _, seconds in growing) for pick in (min, max))
-    some = f"; {rounded(least, True)} s is enough for some" if least < WORTH * most else ""
+    some = f"; {rounded(least, True)} s is enough for some" if least < 0.9 * most else ""
     return f"a solver.duration of {rounded(most, True)} s is enough for all{some}"

@@ -19,17 +19,8 @@ from brakecli.studies.sweeps.plan import Plan, label
 MOST_POINTS = 10_000_000
 WORKER_WORK = 1.3
 """Work, as `runs.work` counts it, that a core does while workers start: less is not worth them."""
-# Work of a point beside its run: of a verdict that comes early, and of a search for a critical value.
-_EARLY = 3e-3
-_SEARCH = 0.1
-_SEARCH_RUNS = 12.0  # of a search by simulation, for the least sustained value
-# Bytes, measured with `make bench-sweep`.
 WORKER_BYTES = 1.8e8
-_SAMPLE_BYTES = 8.0 * 24
-_RECORD_BYTES = 150.0  # of a point in the journal, and in the result
-# in the parent, which writes lines that are followed all at once
-_POINT_BYTES = 20.0
-_FOLLOWED_BYTES = 400.0
+"""Memory of a process; it and that of records is measured with `make bench-sweep`."""
 
 
 @dataclass(frozen=True)
@@ -75,22 +66,22 @@ def size_of(plan: Plan, workers: int, *, spare: bool = False) -> Size:
             refuse(check(system))
             samples = max(samples, system.samples)
             tables = max(tables, system.table_bytes)
-            run = _EARLY if may_be_early(system) else work_of(system).amount
-            if critical is not None:
-                run = _SEARCH + (_SEARCH_RUNS * run if critical.method == "simulation" else run)
+            run = 3e-3 if may_be_early(system) else work_of(system).amount
+            if critical is not None:  # by simulation, some runs look for the least sustained value
+                run = 0.1 + (12.0 * run if critical.method == "simulation" else run)
             work = max(work, run)
             together = min(together, TOGETHER if plan.followed is None and loops([to_judge(system)]) else 1)
     if spare and plan.units * plan.unit_length * work < WORKER_WORK:
         workers = 0
     together = max(1, min(together, plan.units // max(workers, 1)))
     records = plan.passes * plan.points
-    in_parent = _POINT_BYTES if plan.followed is None else _FOLLOWED_BYTES
-    histories = _SAMPLE_BYTES * samples * max(workers, 1) * together
+    in_parent = 20.0 if plan.followed is None else 400.0  # which writes lines that are followed all at once
+    histories = 8.0 * 24 * samples * max(workers, 1) * together
     return Size(
         points=records,
         workers=workers,
         memory=(WORKER_BYTES + tables) * (workers + 1) + histories + in_parent * records,
-        file_size=_RECORD_BYTES * records + FILE_BYTES,
+        file_size=150.0 * records + FILE_BYTES,
         together=together,
         refused=tuple(failing),
         implausible=tuple(strange),

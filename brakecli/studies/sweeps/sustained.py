@@ -21,13 +21,6 @@ from brakecli.studies.sweeps.simulate import verdict_of
 from brakecli.studies.sweeps.windows import Outcome, Search
 from brakecli.studies.sweeps.windows_of_branch import calm
 
-GALLOP = 2.0
-"""Factor from one stride to the next in looking for the end of sustained vibration."""
-DURATIONS: tuple[float, ...] = 1.0, 2.0, 4.0, 8.0
-"""Durations of the case for which it is run where the equations say nothing."""
-SAME = 0.01
-"""Relative change of the amplitude in a run twice as long that shows that a vibration lasts."""
-
 LASTS = Fate(Kind.VIBRATION)
 FADES = Fate(Kind.STEADY_SLIDING)
 UNKNOWN = Fate(Kind.UNKNOWN)
@@ -77,7 +70,7 @@ def sustained(answers: Answers, tolerance: float, loss: Search) -> Lasting:
         stride = tolerance
         while lasts(low) is not False and low > line.low:
             low, high = max(line.low, low - stride), low if lasts(low) else high
-            stride *= GALLOP
+            stride *= 2.0
     if lasts(low) is None or lasts(high) is None:
         return ended(None, Outcome.UNDECIDED)
     if lasts(low):
@@ -113,7 +106,9 @@ def _end(answers: Answers, value: float) -> Fate:
 
 
 def _by_runs(case: Case, system: System) -> Fate:
-    """Whether vibration lasts by the verdicts on runs, each twice as long as the one before.
+    """Whether vibration lasts by the verdicts on runs of one to eight durations, each twice as long as the last.
+
+    It does where the amplitude changes by a hundredth at most from one to the next.
 
     It is asked where sliding is not known to be unstable. So in full contact what neither sticks nor lifts off
     does not grow, as it is linear, and counts as fading; without dashpots it stays as it is.
@@ -123,7 +118,7 @@ def _by_runs(case: Case, system: System) -> Fate:
     # of the run before
     regime = Regime.UNDECIDED
     amplitude = math.inf
-    for times in DURATIONS:
+    for times in (1.0, 2.0, 4.0, 8.0):
         verdict = verdict_of(changed(case, solver={"duration": times * system.duration}))
         if verdict is None or verdict.contact_loss_fraction == 1.0 or verdict.stick_fraction == 1.0:
             break
@@ -131,7 +126,7 @@ def _by_runs(case: Case, system: System) -> Fate:
         if verdict.regime is Regime.DAMPED or (free and linear):
             return FADES
         alike = verdict.regime is regime is not Regime.UNDECIDED
-        if alike and abs(amplitude - verdict.amplitude) <= SAME * verdict.amplitude:
+        if alike and abs(amplitude - verdict.amplitude) <= 0.01 * verdict.amplitude:
             return LASTS
         regime = verdict.regime
         amplitude = verdict.amplitude

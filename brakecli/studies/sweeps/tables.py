@@ -10,8 +10,6 @@ from brakecli.case.read import key_path
 from brakecli.case.tables import MISSING, Number, OverCase, Positive, Table, described, from_list
 from brakecli.errors import Problem, found_text
 
-_ROUNDING = 1e-12  # of a value, beyond which eigenvalues do not tell two apart
-
 
 def _not_key_paths(*texts: str) -> Iterator[Problem]:
     for text in texts:
@@ -103,7 +101,7 @@ class Critical(Table):
     def _broken_rules(self) -> Iterator[Problem]:
         if self.upper <= self.lower:
             yield self.wrong("upper", "is not above lower", "give a range to search in")
-        elif self.tolerance < _ROUNDING * max(abs(self.lower), abs(self.upper)):
+        elif self.tolerance < 1e-12 * max(abs(self.lower), abs(self.upper)):  # eigenvalues tell no less apart
             yield self.wrong("tolerance", "is below the rounding of the parameter", "widen it")
         yield from _not_key_paths(self.parameter)
 

@@ -222,7 +222,7 @@ def test_a_run_that_is_too_coarse_by_far_ends_early() -> None:
 
 
 def test_where_nothing_finer_helps_the_last_run_is_whole(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(own_error, "FINEST", 1.0)  # times `_BEYOND` it is more than the first run has
+    monkeypatch.setattr(own_error, "FINEST", 1.0)  # times a thousandth it is more than the first run has
     system, run, tried = far_too_coarse()
     found = last_of(by_own_error(system), run)
     assert [each.work.failure for each in tried] == [Failure.COARSE, Failure.NONE]

@@ -6,7 +6,7 @@ import time
 from collections import deque
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
-from typing import Any
+from typing import TYPE_CHECKING
 
 from brakecli.errors import BrakecliError, RefusedError, UsageError
 from brakecli.faces import argument
@@ -22,12 +22,12 @@ from brakecli.studies.sweeps.workers.task import (
     headline,
 )
 
+if TYPE_CHECKING:
+    from distributed import Client, Future
+
 CONNECT_SECONDS = 20
 WAIT_SECONDS = 60.0  # for a worker to come, or to come back
-FETCH_SECONDS = 5.0  # for a finished result, whose worker may have died with it: dask then computes it again
 LOOK_SECONDS = 1.0  # from one look at which workers there are to the next
-TASKS_PER_THREAD = 3
-LARGEST_FILE = 1_000_000  # bytes of a scheduler's file
 NOISY = ("distributed", "tornado", "asyncio")  # packages whose logs do not belong on standard error
 KEPT = "; finished points are kept, run the same command again"
 INSTALL = "; install the same version there"
@@ -36,14 +36,14 @@ INSTALL = "; install the same version there"
 class ClusterEngine(Engine):
     """The workers of a dask scheduler. Dask gives the tasks of a worker that dies to others."""
 
-    def __init__(self, compute: Compute, scheduler: Any, scheduler_file: str | None) -> None:
+    def __init__(self, compute: Compute, scheduler: object, scheduler_file: str | None) -> None:
         """Connect to a scheduler and compare versions; raises UsageError or RefusedError.
 
         It is given by its address, or by a client or a cluster of dask; these stay as they are.
         """
         self.compute = compute
         self._versions = fingerprint()
-        self._shared = None
+        self._shared: Future[Compute] | None = None
         address = str(getattr(getattr(scheduler, "scheduler", None), "address", scheduler))
         option, name = ("scheduler", address) if scheduler_file is None else ("scheduler-file", scheduler_file)
         self._where = f"{argument(option)} {name}"
@@ -74,13 +74,13 @@ class ClusterEngine(Engine):
     def _run(self, next_task: NextTask) -> Iterator[Finished]:
         from distributed import wait
 
-        running: dict[Any, Task] = {}
+        running: dict[Future[Finished | str], Task] = {}
         suspects: deque[Task] = deque()  # last tries that died with a worker which had other tasks, too
         alone = None
         self._reachable = self._addresses()
         looked = last_sign = time.monotonic()
         while True:
-            while len(running) < TASKS_PER_THREAD * self.workers and (task := next_task()) is not None:
+            while len(running) < 3 * self.workers and (task := next_task()) is not None:
                 running[self._submit(task)] = task
             if suspects and not running:
                 alone = suspects.popleft()
@@ -110,13 +110,13 @@ class ClusterEngine(Engine):
             if time.monotonic() - last_sign > WAIT_SECONDS + LOOK_SECONDS:
                 raise BrakecliError(f"{self._where}: has no workers any more{KEPT}")
 
-    def _submit(self, task: Task) -> Any:
+    def _submit(self, task: Task) -> "Future[Finished | str]":
         # What computes, measured profiles included, is a task as well: it travels once, and survives its worker.
         # Not by dask's own executor, whose futures never end where a result cannot be fetched.
         self._shared = self._shared or self._client.submit(_itself, self.compute, pure=False)
         return self._client.submit(_attempt, self._shared, task, self._versions, pure=False)
 
-    def _collect(self, future: Any) -> Finished | None:
+    def _collect(self, future: "Future[Finished | str]") -> Finished | None:
         """The end of a task, None if its workers have died. Raises TimeoutError while dask computes it again."""
         from distributed import KilledWorker
 
@@ -128,7 +128,7 @@ class ClusterEngine(Engine):
             if isinstance(error := future.exception(), KilledWorker):
                 return None
             raise BrakecliError(f"{self._where}: a worker cannot compute ({headline(error)}){KEPT}")
-        finished: Finished | str = future.result(timeout=FETCH_SECONDS)
+        finished: Finished | str = future.result(timeout=5.0)  # s; its worker may have died with it
         if isinstance(finished, str):
             raise RefusedError(f"{self._where}: {finished}{INSTALL}")
         return finished
@@ -160,7 +160,7 @@ class ClusterEngine(Engine):
     def _address_in(self, scheduler_file: str) -> str:
         """The address in a scheduler's file; dask itself would wait for ever for the file to come."""
         try:
-            return str(json.loads(contents(scheduler_file, LARGEST_FILE))["address"])
+            return str(json.loads(contents(scheduler_file, 1_000_000))["address"])
         except OSError as error:
             reason = (error.strerror or str(error)).lower()
         except (ValueError, KeyError, TypeError, RecursionError):
@@ -168,7 +168,7 @@ class ClusterEngine(Engine):
         remedy = f"start a scheduler with: dask scheduler --scheduler-file {scheduler_file}"
         raise UsageError(f"{self._where}: cannot be read: {reason}; {remedy}")
 
-    def _connected(self, address: str, security: Any) -> Any:
+    def _connected(self, address: str, security: object) -> "Client":
         try:
             from distributed import Client
         except ImportError as error:
@@ -184,7 +184,7 @@ class ClusterEngine(Engine):
             def __del__(self) -> None:
                 """Where its start has failed there is nothing to close; dask would try to, and complain."""
 
-        quiet: Any = _Client
+        quiet: type[Client] = _Client
         with self._explained(UsageError, "no scheduler answers", "; start one with: dask scheduler"):
             return quiet(address, timeout=CONNECT_SECONDS, security=security, set_as_default=False)
 

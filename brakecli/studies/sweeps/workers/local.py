@@ -20,7 +20,6 @@ from brakecli.stop import check_signals
 from brakecli.studies.sweeps.workers.task import Compute, Engine, Finished, NextTask, Task, attempt
 
 _SIGNALS = (signal.SIGHUP, signal.SIGINT, signal.SIGTERM)
-_LOOK_SECONDS = 1.0  # between two looks for signals that have arrived just before the wait for workers
 
 
 @dataclass
@@ -93,7 +92,8 @@ class LocalEngine(Engine):
             busy = [worker for worker in self.pool if worker.task is not None]
             if not busy:
                 return
-            ready = connection.wait([worker.pipe for worker in busy], _LOOK_SECONDS)
+            # A signal may have arrived just before this: it is looked for once in a second.
+            ready = connection.wait([worker.pipe for worker in busy], 1.0)
             finished = [self._collect(worker) for worker in busy if worker.pipe in ready]
             self._hand_out(next_task)  # before the results are written, which a worker need not wait for
             yield from finished
