@@ -6,7 +6,6 @@ import tempfile
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -90,7 +89,7 @@ def stored(data: xr.Dataset | xr.DataTree, name: str) -> Iterator[Path]:
             raise
 
 
-def dataset(declared: Iterable[Field], numbers: Mapping[str, Any]) -> xr.Dataset:
+def dataset(declared: Iterable[Field], numbers: Mapping[str, object]) -> xr.Dataset:
     """Numbers and texts as variables with their units; lists as attributes, and objects, as JSON."""
     result = xr.Dataset()
     by_name = {field.name: field for field in declared}

@@ -13,12 +13,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from brakecli.errors import CannotWriteError, UsageError
 from brakecli.faces import argument
 from brakecli.results.os_signals import lastly, signals_deferred
 from brakecli.stop import check_signals
+
+if TYPE_CHECKING:
+    from _typeshed import ReadableBuffer, WriteableBuffer
 
 _REMEDIES = {
     **dict.fromkeys((errno.ENOSPC, errno.EDQUOT), "free some space there, or "),
@@ -42,7 +45,7 @@ class OutputFile(FileIO):
         self._temporary = target.with_name(f".{target.name}.part")
         super().__init__(self._temporary, "w+", opener=open_own)
 
-    def write(self, data: Any) -> int:
+    def write(self, data: "ReadableBuffer") -> int:
         """Write all of `data`, or remember why not."""
         view = memoryview(data).cast("B")
         written = 0
@@ -53,7 +56,7 @@ class OutputFile(FileIO):
             self.failure = error
         return len(view)
 
-    def readinto(self, buffer: Any) -> int:
+    def readinto(self, buffer: "WriteableBuffer") -> int:
         """Fill `buffer`, with zeros behind the end: what a failed write left out must not stop HDF5."""
         view = memoryview(buffer).cast("B")
         filled = 0

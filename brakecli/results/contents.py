@@ -2,9 +2,9 @@
 
 import math
 from bisect import bisect_left
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -29,8 +29,6 @@ _APART = {
     "complete",
 }
 _RISING = ("time", "frequency")  # axes along which values are interpolated
-_NAMED = 3  # keys of the case in a sentence
-_ROUNDING = 1e-9  # of the largest value, which interpolation may add
 
 HELD = (
     Field("group", "", "group of the file", TEXT),
@@ -99,14 +97,28 @@ def _is_aside(name: str) -> bool:
     return name.endswith("_error") or "windows" in name
 
 
+class DifferentVariable(TypedDict):
+    """A variable that differs, as `DIFFERENT_VARIABLE` declares it."""
+
+    group: str
+    name: str
+    shapes: list[list[int] | None]
+    compared: int
+    different: int
+    largest: float | None
+    relative: float | None
+    units: str
+    interpolated: str | None
+
+
 @dataclass(frozen=True)
 class Difference:
     """How a second result differs from a first one; `DIFFERENCE_OF_TWO` declares it."""
 
-    case: list[dict[str, Any]]
-    numbers: list[dict[str, Any]]
-    variables: list[dict[str, Any]]
-    versions: list[dict[str, Any]]
+    case: Sequence[Mapping[str, object]]
+    numbers: Sequence[Mapping[str, object]]
+    variables: Sequence[DifferentVariable]
+    versions: Sequence[Mapping[str, object]]
     judged: bool  # whether both hold a verdict
 
     @property
@@ -120,9 +132,9 @@ class Difference:
         if self.same:
             return "no difference in case, numbers and variables"
         names = [str(key["name"]) for key in self.case]
-        remaining = len(names) - _NAMED
-        more = f" and {remaining} more key{'s' * (remaining > 1)}" if remaining > 0 else ""
-        said = [f"the case differs in {', '.join(names[:_NAMED])}{more}" if names else "the case is the same"]
+        remaining = len(names[3:])
+        more = f" and {remaining} more key{'s' * (remaining > 1)}" if remaining else ""
+        said = [f"the case differs in {', '.join(names[:3])}{more}" if names else "the case is the same"]
         if self.judged:
             pairs = [row for row in self.numbers if row["name"] == "regime"]
             places = [row for row in self.variables if row["name"] == "regime" and row["different"]]
@@ -130,7 +142,7 @@ class Difference:
             said += [f"the verdict differs at {row['different']} of {row['compared']} points" for row in places]
             said += ["the verdict is the same"] * (not pairs and not places)
         if numeric := [row for row in self.variables if row["relative"] and not _is_aside(row["name"])]:
-            most = max(numeric, key=lambda row: row["relative"])
+            most = max(numeric, key=lambda row: row["relative"] or 0.0)
             units = "" if most["units"] == "1" else f" {plain_units(most['units'])}"
             size = f"{most['largest']:.3g}{units}, {most['relative']:.3g} times its largest value"
             said.append(f"{most['name']} differs most, by up to {size}")
@@ -144,7 +156,7 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
         what = f"{a.path} is a {printable(kinds[0])}, and {b.path} a {printable(kinds[1])}"
         raise UsageError(f"{what}: they hold different things; name two results of one kind")
     groups = list(dict.fromkeys([*a.groups, *b.groups]))
-    numbers: list[dict[str, Any]] = [{}, {}]
+    numbers: list[dict[str, object]] = [{}, {}]
     for attributes, result in zip(numbers, (a, b), strict=True):
         for group in groups:
             for name, value in result.group_attributes(group).items() if group in result.groups else ():
@@ -158,29 +170,30 @@ def difference(a: StoredResult, b: StoredResult) -> Difference:
     units |= {f"spectrum/{field.name}": field.units for field in WELCH}
     differing = [*changed(*numbers)]
     for number in differing:
-        number["units"] = units.get(number["name"], units.get(f"/{number['name']}", ""))
+        name = str(number["name"])
+        number["units"] = units.get(name, units.get(f"/{name}", ""))
     variables = [variable for group in groups for variable in _variables(a, b, group)]
     of_program = [*changed(a.versions, b.versions)]
     judged = all("regime" in {**file.attributes, **file.variables("/")} for file in (a, b))
     return Difference([*changed(*map(keys, (a, b)))], differing, variables, of_program, judged)
 
 
-def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, Any]:
+def keys(result: StoredResult, texts: Sequence[str] = _CASES) -> dict[str, object]:
     """All keys of the case, and of the sweep or the study, with their values."""
-    values: dict[str, Any] = {}
+    values: dict[str, object] = {}
     for name in texts:
         values |= flat(parse(str(result.attributes.get(name, "")), f"{result.path}: {name}"))
     return values
 
 
-def changed(a: dict[str, Any], b: dict[str, Any]) -> Iterator[dict[str, Any]]:
+def changed(a: Mapping[str, object], b: Mapping[str, object]) -> Iterator[dict[str, object]]:
     """Name and both values of all that differs; None stands for what one of them lacks."""
     for name in dict.fromkeys([*a, *b]):
         if a.get(name) != b.get(name):
             yield {"name": name, "a": a.get(name), "b": b.get(name)}
 
 
-def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[str, Any]]:
+def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[DifferentVariable]:
     """The variables of a group that differ, at the same places along their axis."""
     by_name = [file.variables(group) if group in file.groups else {} for file in (a, b)]
     for name in dict.fromkeys([*by_name[0], *by_name[1]]):
@@ -200,7 +213,7 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[dict[st
                     there = (one != FILL) & (other != FILL)
                     off = np.where(there, np.abs(1.0 * one - other), 0.0)
                     sizes = [float(np.abs(values[there]).max(initial=0.0)) for values in (one, other)]
-                    apart &= ~there | (off > (_ROUNDING * max(sizes) if along else 0.0))
+                    apart &= ~there | (off > (1e-9 * max(sizes) if along else 0.0))  # interpolation may add that
                     largest = max(largest, float(off.max(initial=0.0)))
                     highest = max(highest, *sizes)
                 compared = compared + one.size

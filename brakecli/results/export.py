@@ -18,18 +18,10 @@ from brakecli.results.atomic import check_target, new_output
 from brakecli.results.field import labelled, plain_units
 from brakecli.results.read import StoredResult, Variable
 from brakecli.results.write import FILL
+from brakecli.solver.arrays import Floats
 
 RATE = 44_100  # samples of sound per second
-PEAK = 10.0 ** (-3.0 / 20.0)  # -3 dB of full scale
-_BLOCK = 1 << 16  # rows read at a time
-_LONGEST = 3600.0  # s of sound
-_QUIET = 1e-3  # part of the power that may be left out unsaid
-_LARGEST_RATIO = 10_000  # whole numbers of samples that a resampled sound is made by
-_LOST = 1e-6  # of the largest value: a sound that is less is none
-_HEARD = 20.0  # Hz
-_FADED = 0.01  # of its peak, 40 dB below it: what is less of a sound is not heard beside it; a choice
 _FORMULAS = ("=", "+", "-", "@")  # what begins one in a spreadsheet
-_UNEVEN = 1e-3  # of the time between two samples, by which it may vary
 _TABLES = (
     fields.EVENTS,
     fields.HISTORY,
@@ -120,7 +112,7 @@ def export(
 
 def _rows(
     result: StoredResult, group: str, names: Sequence[str], excerpt: Excerpt, tell: Callable[[str, int, int], None]
-) -> Iterator[list[Sequence[Any]]]:
+) -> Iterator[list[Sequence[object]]]:
     """The header and blocks of rows of a table: one row for each place along the axes of the group."""
     variables = result.variables(group)
     axes = ("point",) if group.startswith("branch_") else _AXES[group] if group != "/" else _main(variables)
@@ -144,7 +136,7 @@ def _rows(
     places = [result.read(group, axis) for axis in axes]
     first, last = _ends(places[0], excerpt) if excerpt != WHOLE else (0, shape[0])
     every = excerpt.every
-    rows = every * max(1, _BLOCK // math.prod(shape[1:]))
+    rows = every * max(1, (1 << 16) // math.prod(shape[1:]))  # read at a time
     for start in range(first, last, rows):
         stop = min(start + rows, last)
         block = places[0][start:stop:every]
@@ -159,7 +151,7 @@ def _rows(
         tell("rows", stop - first, last - first)
 
 
-def _ends(time: NDArray[Any], excerpt: Excerpt) -> tuple[int, int]:
+def _ends(time: Floats, excerpt: Excerpt) -> tuple[int, int]:
     """The rows between two times, both included; raises UsageError where there are none."""
     first = int(np.searchsorted(time, excerpt.start, "left"))
     last = int(np.searchsorted(time, excerpt.end, "right"))
@@ -170,7 +162,7 @@ def _ends(time: NDArray[Any], excerpt: Excerpt) -> tuple[int, int]:
     return first, last
 
 
-def _cells(column: NDArray[Any]) -> list[Any]:
+def _cells(column: NDArray[Any]) -> list[object]:
     """What stands in a column: numbers, or nothing; texts that no spreadsheet takes for formulas or controls."""
     if column.dtype.kind == "U":
         return ["'" * text.lstrip().startswith(_FORMULAS) + escaped(text) for text in column.tolist()]
@@ -225,10 +217,10 @@ def _sound(result: StoredResult, name: str, excerpt: Excerpt) -> tuple[bytes, li
     first, last = _ends(time, excerpt) if excerpt != WHOLE else (0, len(time))
     steps = np.diff(time[first:last])
     values = result.read("history", name, first, last) if len(steps) else np.zeros(0)
-    if len(steps) and np.ptp(steps) > _UNEVEN * np.median(steps):
+    if len(steps) and np.ptp(steps) > 1e-3 * np.median(steps):
         raise UsageError(f"{result.path}: its samples are not equally spaced, as a sound needs them; export .csv")
     duration = float(np.mean(steps)) * len(values) if len(values) else 0.0
-    if duration > _LONGEST:
+    if duration > 3600.0:
         raise UsageError(f"{result.path}: {duration:.4g} s are too long for a sound; an hour is the most")
     values = values - np.mean(values) if len(values) else values
     if not np.any(values):
@@ -240,20 +232,22 @@ def _sound(result: StoredResult, name: str, excerpt: Excerpt) -> tuple[bytes, li
     frequency = np.fft.rfftfreq(len(values), 1.0 / rate)
     if rate > RATE:
         lost = float(power[frequency > 0.5 * RATE].sum() / power.sum())
-        if lost > _QUIET:
+        if lost > 1e-3:
             notes.append(f"{lost:.2%} of the power of {name} is above {0.5 * RATE:g} Hz and not in the sound")
-    ratio = Fraction(RATE / rate).limit_denominator(_LARGEST_RATIO)
+    ratio = Fraction(RATE / rate).limit_denominator(10_000)
     sound = resample_poly(values, ratio.numerator, ratio.denominator) if ratio else np.zeros(1)
-    if not (peak := float(np.abs(sound).max())) > _LOST * float(np.abs(values).max()):
+    if not (peak := float(np.abs(sound).max())) > 1e-6 * float(np.abs(values).max()):
         above = f"all of {name} is above {0.5 * RATE:g} Hz, which no sound holds"
         raise UsageError(f"{result.path}: {above}; export .csv")
     tone = result.attributes.get("frequency") or frequency[np.argmax(power)]
-    if tone < _HEARD or tone > 0.5 * RATE:
+    if tone < 20.0 or tone > 0.5 * RATE:
         notes.append(f"the vibration at {tone:.4g} Hz cannot be heard")
     if [result.attributes.get(name) for name in ("regime", "excitation")] == ["damped", "none"]:
-        heard = np.flatnonzero(np.abs(sound) > _FADED * peak)[[0, -1]] / RATE
+        faded = 0.01  # 40 dB below its peak: what is less of a sound is not heard beside it; a choice
+        heard = np.flatnonzero(np.abs(sound) > faded * peak)[[0, -1]] / RATE
         when = f"from {heard[0]:.3g} to {heard[1]:.3g} s of {len(sound) / RATE:.3g} s"
-        notes.append(f"the motion dies out: it is heard {when}, and elsewhere is below {_FADED:.0%} of its peak")
+        notes.append(f"the motion dies out: it is heard {when}, and elsewhere is below {faded:.0%} of its peak")
     stream = io.BytesIO()
-    wavfile.write(stream, RATE, np.round(sound * (PEAK * 32767.0 / peak)).astype(np.int16))
+    loudest = 10.0 ** (-3.0 / 20.0)  # 3 dB below full scale
+    wavfile.write(stream, RATE, np.round(sound * (loudest * 32767.0 / peak)).astype(np.int16))
     return stream.getvalue(), notes

@@ -24,7 +24,7 @@ class Field:
     kind: str = "f8"  # the NumPy type of many; a float may be missing: null in JSON, `_FillValue` in a file
     at: str = ""  # attributes, keys and methods on the way to the value; ends with the name if empty or with a dot
     label: str = ""  # words for the terminal; the name if empty
-    missing: Any = None  # what stands for a value that does not exist
+    missing: object = None  # what stands for a value that does not exist
     in_file: bool = True  # what changes from one run of the same case to the next stays outside
     group: str = ""  # of the file, whose attributes hold the items of an object
     rising: bool = False  # whether it is an axis whose numbers increase, none of them missing
@@ -83,14 +83,14 @@ def plain_units(units: str) -> str:
     return units.replace("1^2/Hz", "1/Hz")
 
 
-def integer(name: str, meaning: str, at: str = "", **more: Any) -> Field:
+def integer(name: str, meaning: str, at: str = "", *, missing: object = None, in_file: bool = True) -> Field:
     """A field of a whole number, which has no unit."""
-    return Field(name, "1", meaning, "i8", at, **more)
+    return Field(name, "1", meaning, "i8", at, missing=missing, in_file=in_file)
 
 
-def ratio(name: str, meaning: str, at: str = "", **more: Any) -> Field:
+def ratio(name: str, meaning: str, at: str = "", *, label: str = "", in_file: bool = True) -> Field:
     """A field of a real number without a unit."""
-    return Field(name, "1", meaning, "f8", at, **more)
+    return Field(name, "1", meaning, "f8", at, label, in_file=in_file)
 
 
 def within(at: str, *fields: Field) -> tuple[Field, ...]:

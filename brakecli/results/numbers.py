@@ -56,23 +56,23 @@ def rows(result: StoredResult, group: str, declared: Iterable[Field]) -> list[di
     return [dict(zip(lists, row, strict=True)) for row in zip(*lists.values(), strict=True)]
 
 
-def _or_none(value: Any) -> Any:
+def _or_none(value: object) -> object:
     if isinstance(value, list):
         return [_or_none(item) for item in value]
     return None if value == FILL else value
 
 
-def _branch(result: StoredResult, group: str) -> dict[str, Any]:
+def _branch(result: StoredResult, group: str) -> dict[str, object]:
     """A branch: its motions, and its special points."""
     points = [field for field in stability_fields.BRANCH_POINT if field.name != "multipliers"]
-    branch: dict[str, Any] = {"note": ""}
+    branch: dict[str, object] = {"note": ""}
     branch |= {name: plain(value) for name, value in result.group_attributes(group).items()}
     branch["points"] = rows(result, group, points)
     branch["special"] = rows(result, f"{group}/special", stability_fields.SPECIAL)
     return branch
 
 
-def _by_name(result: StoredResult, names: Field, declared: Iterable[Field]) -> dict[str, Any]:
+def _by_name(result: StoredResult, names: Field, declared: Iterable[Field]) -> dict[str, object]:
     """Values by the texts along their axis; none where the file has no such axis."""
     if names.name not in result.variables("/"):
         return {}

@@ -11,10 +11,15 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from brakecli.errors import CannotWriteError, escaped
 from brakecli.stop import show_signals
+
+if TYPE_CHECKING:
+    from signal import _HANDLER
+
+    from _typeshed import ReadableBuffer
 
 _WORDS: dict[int, str] = {
     signal.SIGHUP: "hung up",
@@ -91,7 +96,7 @@ def signals_deferred() -> Iterator[list[int]]:
             signal.raise_signal(number)
 
 
-def _handlers() -> dict[int, Any]:
+def _handlers() -> "dict[int, _HANDLER]":
     """The handlers of all signals that are not ignored.
 
     A shell lets background jobs ignore Ctrl-C, and nohup lets every command ignore SIGHUP.
@@ -126,7 +131,7 @@ class _Shown(io.TextIOWrapper):
 class Styled:
     """A standard stream for a text whose control characters are the program's own."""
 
-    def __init__(self, stream: Any) -> None:
+    def __init__(self, stream: TextIO) -> None:
         """Write to `stream`, which is `sys.stdout` or `sys.stderr`."""
         self._stream = stream
 
@@ -148,7 +153,7 @@ class _Stream(io.FileIO):
 
     _failed = False
 
-    def write(self, data: Any) -> int:
+    def write(self, data: "ReadableBuffer") -> int:
         try:
             if not self._failed:
                 return super().write(data)

@@ -12,7 +12,7 @@ from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field
 from io import FileIO, RawIOBase
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import h5py
 import numpy as np
@@ -27,6 +27,8 @@ FORMAT_VERSION = 1
 BLOCK = 1 << 20  # rows read at a time
 _DIGEST = 32  # bytes
 _MACHINERY = {"CLASS", "NAME", "DIMENSION_LIST", "REFERENCE_LIST", "_Encoding", "_FillValue"}  # of netCDF-4
+
+_Node = TypeVar("_Node", bound=h5py.HLObject)
 
 
 class _Named(dict[str, Any]):
@@ -100,7 +102,7 @@ class StoredResult:
             values: NDArray[Any] = node[start:stop]
             return np.char.decode(values, "utf-8") if values.dtype.kind == "S" else values
 
-    def _node(self, name: str, kind: type[Any], what: str) -> Any:
+    def _node(self, name: str, kind: type[_Node], what: str) -> _Node:
         node = self.file.get(name)
         if not isinstance(node, kind):
             raise ValueError(f"there is no {what}")
@@ -130,7 +132,7 @@ def open_result(path: Path, kind: str | None = None) -> Iterator[StoredResult]:
         yield StoredResult(path, file, stream, _Named(path, attributes), length)
 
 
-def check_form(attributes: Mapping[str, Any]) -> None:
+def check_form(attributes: Mapping[str, object]) -> None:
     """Raise ValueError unless these are the attributes of the root of a whole result of this version."""
     if attributes.get("format") != FORMAT:
         raise ValueError(f'it was not written by this program, attribute format = "{FORMAT}" is missing')

@@ -26,20 +26,16 @@ Array = NDArray[Any]
 _COMMENTS = ("#", "%")
 LARGEST = 500_000_000  # bytes of a file of measured numbers
 _HEAD = 1 << 16  # bytes of a text file from which its layout is found
-_NEAR = 100  # lines of numbers from which the decimal sign is found
-_AT_ONCE = 10_000  # rows that become numbers together
-_DIGITS = 9  # of the number of a column: no file has more
 _QUOTED = re.compile(r'"[^"]*"')
 _COMMA = re.compile(r"[+-]?(?:[0-9]+,[0-9]*|,[0-9]+)(?:[eE][+-]?[0-9]+)?")
 _GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2},[0-9]{3}")
 _COMMENT = re.compile(r"[#%].*")
 _ONE = r"[^\W\d_]+|[°%]"  # name of a unit
-_LONGEST = 80  # characters of a unit
 _POWER = r"(?:\^?-?\d|⁻?[¹²³])?"  # bounded
 _UNIT = rf"(?:{_ONE}){_POWER}(?:(?: *[*·⋅/] *| +)(?:{_ONE}){_POWER})*"
 
 
-def require(good: Any, problem: str) -> None:
+def require(good: object, problem: str) -> None:
     """Raise UnreadableResultError unless all is good."""
     if not good:
         raise UnreadableResultError(problem)
@@ -47,7 +43,7 @@ def require(good: Any, problem: str) -> None:
 
 def ordinal(text: str) -> int:
     """The number of a column, from 1, that a text names; 0 where it names none."""
-    return int(text) if text.isascii() and text.isdigit() and len(text) <= _DIGITS else 0
+    return int(text) if text.isascii() and text.isdigit() and len(text) <= 9 else 0  # no file has more
 
 
 class TextTable:
@@ -79,7 +75,7 @@ class TextTable:
                 numbers = [_number(cell, decimal_comma=comma) for cell in cells]
                 if any(cells) and None not in numbers:
                     self.columns = len(cells)
-                    self._find_sign(lines[self.skip : self.skip + _NEAR])
+                    self._find_sign(lines[self.skip : self.skip + 100])
                     self._name()
                     return
             self.header.append(line)
@@ -180,7 +176,7 @@ class TextTable:
         rows = self._rows(self._lines())
         line = self.skip
         columns_of_blocks = [list[Array]() for _ in columns]
-        while some := list(islice(rows, _AT_ONCE)):
+        while some := list(islice(rows, 10_000)):
             places: Sequence[int] = range(line + 1, line + 1 + len(some))
             line += len(some)
             if {*map(len, some)} != {self.columns} or self.columns == 1:
@@ -251,7 +247,7 @@ def _registry() -> Any:
 @cache
 def si(unit: str) -> tuple[float, str] | None:
     """The size of a unit in SI, and that SI unit in words, such as meter or radian; None where there is none."""
-    if len(unit) > _LONGEST or not re.fullmatch(_UNIT, unit):  # pint would compute powers of powers
+    if len(unit) > 80 or not re.fullmatch(_UNIT, unit):  # pint would compute powers of powers
         return None
     registry = _registry()
     try:

@@ -54,7 +54,7 @@ def innermost(values: Mapping[KeyPath, _Value], path: KeyPath, default: _Value) 
     return next((values[prefix] for prefix in prefixes if prefix in values), default)
 
 
-def only_path(data: Any) -> tuple[tuple[str, ...], Any]:
+def only_path(data: object) -> tuple[tuple[str, ...], object]:
     """The path through tables of a single key, and what stands at its end."""
     path: tuple[str, ...] = ()
     while isinstance(data, dict) and len(data) == 1:
@@ -125,7 +125,7 @@ class Located:
             elif table is not None:
                 self._add(table, path, parsed, line)
 
-    def _enter(self, parsed: dict[str, Any], line: int) -> tuple[dict[str, Any] | None, KeyPath]:
+    def _enter(self, parsed: dict[str, object], line: int) -> tuple[dict[str, Any] | None, KeyPath]:
         """The table of a header, given as what tomllib makes of it; the keys that follow belong to this table."""
         keys, leaf = only_path(parsed)
         table: Any = self.data
@@ -137,7 +137,7 @@ class Located:
             if new is leaf and {type(table), type(leaf)} == {dict, list}:
                 self._report_twice(path, line, f"has both headers [{key_text(path)}] and [[{key_text(path)}]]")
                 return None, path
-            if isinstance(table, list) and new:
+            if isinstance(table, list) and isinstance(new, list):
                 self.lines.setdefault(path, line)
                 table += new
             if isinstance(table, list) and table:
@@ -152,7 +152,7 @@ class Located:
         self.lines.setdefault(path, line)
         return table, path
 
-    def _add(self, table: dict[str, Any], path: KeyPath, parsed: dict[str, Any], line: int) -> None:
+    def _add(self, table: dict[str, Any], path: KeyPath, parsed: dict[str, object], line: int) -> None:
         for key, value in parsed.items():
             here = (*path, key)
             if isinstance(value, dict) and isinstance(table.setdefault(key, {}), dict):

@@ -52,7 +52,6 @@ _VARIABLES = {  # the first of a kind has the length of all
     ("branch", "branch_*/special"): stability_fields.SPECIAL,
 }
 _OBJECTS = {field.group: field for field in fields.RUN if field.group}  # whose items are attributes of a group
-_BRIEFEST = 1e-120  # between two numbers of an axis: beyond what the smallest and largest of a case make
 
 
 def check_result(file: h5py.File) -> None:
@@ -118,15 +117,16 @@ def _check_variables(parent: h5py.Group, kind: str, group: str, declared: tuple[
         if node.shape[: len(node.shape) - inner] != shape:
             raise ValueError(f"{where} has the shape {node.shape}, and {axis} has {shape}")
         for start in range(0, len(node), BLOCK) if field.rising else ():
-            if not (np.diff(node[max(start - 1, 0) : start + BLOCK]) > _BRIEFEST).all():
+            # less lies beyond what the smallest and largest numbers of a case make
+            if not (np.diff(node[max(start - 1, 0) : start + BLOCK]) > 1e-120).all():
                 raise ValueError(f"{where} does not increase")
 
 
-def _fits(field: Field, value: Any) -> bool:
+def _fits(field: Field, value: object) -> bool:
     """Whether an attribute is what was declared."""
     whole = isinstance(value, int)
     if field.kind[0] == "f":
-        return (whole or isinstance(value, float)) and abs(value) <= LARGEST
+        return isinstance(value, int | float) and abs(value) <= LARGEST
     if field.kind[0] == "i" or field.rows:
         return whole
     if not field.is_list:

@@ -35,7 +35,7 @@ class _Variable:
 
     field: Field
     dims: tuple[str, ...]
-    attributes: dict[str, Any]
+    attributes: dict[str, object]
     waiting: NDArray[Any]
     written: int = 0
 
@@ -51,7 +51,7 @@ class ResultFile:
         """Prepare a result in the file that `new_result` has opened."""
         self._output = output
         self._growing: dict[str, dict[str, _Variable]] = {}
-        self._file: Any = None
+        self._file: h5py.File = None
 
     def open(self) -> None:
         """Begin with an empty file."""
@@ -60,7 +60,7 @@ class ResultFile:
             self._file = h5py.File(self._output, "w", libver=("v108", "v108"), rdcc_nbytes=0)
         self.set_attributes({"format": FORMAT, "format_version": FORMAT_VERSION})
 
-    def set_attributes(self, attributes: Mapping[str, Any], group: str = "/") -> None:
+    def set_attributes(self, attributes: Mapping[str, object], group: str = "/") -> None:
         """Set attributes of a group: str, int, float, lists of str, and lists and arrays of numbers."""
         with self._hdf5():
             _set_attributes(self._file.require_group(group), attributes)
@@ -82,7 +82,7 @@ class ResultFile:
         self.variable(group, field, (field.name,), values)
 
     def column(
-        self, field: Field, dims: Sequence[str], values: ArrayLike, group: str = "/", **attributes: Any
+        self, field: Field, dims: Sequence[str], values: ArrayLike, group: str = "/", **attributes: object
     ) -> None:
         """Write a variable whose numbers may be missing: None, NaN, or too large to say anything."""
         if field.kind == "f8":
@@ -92,7 +92,12 @@ class ResultFile:
         self.variable(group, field, dims, values, **attributes)
 
     def variable(
-        self, group: str, field: Field, dims: Sequence[str], values: ArrayLike | None = None, **attributes: Any
+        self,
+        group: str,
+        field: Field,
+        dims: Sequence[str],
+        values: ArrayLike | None = None,
+        **attributes: object,
     ) -> None:
         """Write a variable over the axes `dims` of its group; without `values` it grows along its only axis.
 
@@ -118,9 +123,11 @@ class ResultFile:
                 raise ValueError(f"{group}/{name}: its shape {checked.shape} is not that of its axes {lengths}")
             self._create(group, variable, checked.shape, checked.dtype, grows=0 in checked.shape)[...] = checked
 
-    def begin_column(self, field: Field, dims: Sequence[str], kind: np.dtype[Any], **attributes: Any) -> None:
+    def begin_column(
+        self, field: Field, dims: Sequence[str], kind: np.dtype[np.generic], **attributes: object
+    ) -> None:
         """Begin a packed variable of the root for values of a type, with as many more axes; `fill` gives them."""
-        packed: dict[str, Any] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
+        packed: dict[str, object] = {"shuffle": True, "compression": "gzip", "compression_opts": 1}
         more = {"units": field.units, "long_name": field.meaning, **attributes}
         if kind.base.kind == "S":
             more["_Encoding"] = "utf-8"
@@ -131,7 +138,8 @@ class ResultFile:
             shape = tuple(self._file[axis].shape[0] for axis in dims)
             grid = shape[: len(shape) - kind.ndim]
             dtype = h5py.string_dtype("utf-8", kind.itemsize) if kind.kind == "S" else kind.base
-            self._create("/", variable, shape, dtype, chunks=_chunks(grid) + shape[len(grid) :], **packed)
+            chunks = _chunks(grid) + shape[len(grid) :]
+            self._create("/", variable, shape, dtype, grows=False, chunks=chunks, **packed)
 
     def blocks(self, dims: Sequence[str]) -> Iterator[tuple[int, int, tuple[slice, ...]]]:
         """The chunks of a variable over some axes in the order of its values: first value, end, and place."""
@@ -255,11 +263,11 @@ class ResultFile:
         group: str,
         variable: _Variable,
         shape: tuple[int, ...],
-        kind: Any,
+        kind: np.dtype[np.generic],
         *,
         grows: bool = False,
-        **how: Any,
-    ) -> Any:
+        **how: object,
+    ) -> h5py.Dataset:
         """Create a dataset with checksums, its attributes and axes."""
         parent = self._file.require_group(group)
         name = variable.field.name
