@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from brakecli.api.measured import look_at, quantity_of
 from brakecli.api.values import (
@@ -49,7 +49,7 @@ def slips_in(loaded: LoadedCase) -> list[str]:
     return [*implausible(system_of(loaded.case))]
 
 
-def stability_of(loaded: LoadedCase, tell: Counted, pushes: int | None) -> dict[str, Any]:
+def stability_of(loaded: LoadedCase, tell: Counted, pushes: int | None) -> dict[str, object]:
     """Critical friction, modes and growth of steady sliding, by the names of `--json`.
 
     Also from which friction on a vibration can exist, which so many `pushes` seek; not if None.
@@ -71,7 +71,7 @@ def stability_of(loaded: LoadedCase, tell: Counted, pushes: int | None) -> dict[
     return numbers
 
 
-def modes_along(loaded: LoadedCase, vary: Any, tell: Counted) -> LockIn:
+def modes_along(loaded: LoadedCase, vary: object, tell: Counted) -> LockIn:
     """Both modes of steady sliding along keys of `stability --vary`."""
     from brakecli.studies.runs.limits import within_range
     from brakecli.studies.sweeps.lock_in import lock_in
@@ -95,10 +95,10 @@ def explorer_of(
     named = f"{argument('parameter')} {parameter}" if isinstance(parameter, str) else argument("parameter")
     with within_range():
         line = line_of(loaded, keys, low, high, named)
-    given = [start_of(path, keys) for path in starts]
-    states = states_of(line, given)
+    ends = [start_of(path, keys) for path in starts]
+    states = states_of(line, ends)
     explorer = Explorer(line, tell)
-    explorer.notes += foreign(line, given)
+    explorer.notes += foreign(line, ends)
     return explorer, partial(branch, explorer, states, options.switch, pushes)
 
 

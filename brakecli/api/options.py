@@ -10,7 +10,6 @@ from typing import Any, ForwardRef, ParamSpec, TypeVar
 _P = ParamSpec("_P")
 _Options = TypeVar("_Options")
 _Answer = TypeVar("_Answer")
-_WIDTH = 100
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def docstring(text: str | None, record: Any) -> str:
     lines = []
     for name, option in described(record).items():
         meaning = option.python or option.meaning[:1].lower() + option.meaning[1:]
-        lines.append(fill(f"{name}: {meaning}", _WIDTH, initial_indent=" " * 8, subsequent_indent=" " * 12))
+        lines.append(fill(f"{name}: {meaning}", 100, initial_indent=" " * 8, subsequent_indent=" " * 12))
     return (text or "").replace("        {options}", "\n".join(lines))
 
 

@@ -11,12 +11,6 @@ from typing import TextIO, cast
 
 from brakecli.results.os_signals import Styled, lastly
 
-FIRST_LINE = 20.0
-FIRST_WORD = 1.0
-"""Seconds without a word, after which a terminal shows that there is work."""
-LAST_LINES = 600.0
-"""Seconds to the first line on long work without a terminal, and between the last ones; in between they double."""
-
 
 def say(*lines: str) -> None:
     """Print lines on standard error; a terminal, which would break them within words, gets shorter ones."""
@@ -30,10 +24,11 @@ def say(*lines: str) -> None:
 
 
 @contextmanager
-def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield such a function: a bar; without a terminal lines, after some seconds and then ever less often.
+def telling(quiet: bool, first_line: float = 20.0) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield what tells how many of something are done: a bar, from a second on; lines without a terminal.
 
-    What a line has said of is also said when it is complete.
+    The first line comes after `first_line` seconds, and the time to the next one doubles up to ten minutes. What a
+    line has said of is also said when it is complete.
     """
     if quiet or sys.stderr is None or not sys.stderr.isatty():
         start = time.monotonic()
@@ -45,7 +40,7 @@ def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[s
             ends = 0 < done == total == open_total
             if not quiet and ((passed := time.monotonic() - start) >= due or ends):
                 open_total = total if done < total else 0
-                due = passed + min(passed, LAST_LINES)
+                due = passed + min(passed, 600.0)
                 say(f"{what} {done} of {total}, {passed:.0f} s" if total else f"{what}, {passed:.0f} s")
 
         yield tell
@@ -59,7 +54,7 @@ def telling(quiet: bool, first_line: float = FIRST_LINE) -> Iterator[Callable[[s
     with lastly(bar.stop):
         bar.start()
         task = bar.add_task("at work", visible=False, total=None)
-        unsaid = threading.Timer(FIRST_WORD, bar.update, (task,), {"visible": True})
+        unsaid = threading.Timer(1.0, bar.update, (task,), {"visible": True})
         unsaid.daemon = True
         unsaid.start()
 

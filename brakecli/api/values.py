@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
 MOST_VALUES = 10_000
 """Values along which modes are followed."""
-_LARGEST_BITS = 1024  # of whole numbers: larger ones are no float, and have too many digits to be written
 
 
 def case_of(source: "Source | LoadedSweep", settings: "Changes | None") -> "LoadedCase":
@@ -45,14 +44,14 @@ def case_of(source: "Source | LoadedSweep", settings: "Changes | None") -> "Load
     return load_case(path_of(source), overrides(settings))
 
 
-def path_of(source: Any) -> str:
+def path_of(source: object) -> str:
     """The path of a file; raises UsageError for what is none."""
     if not isinstance(source, str | PathLike) or not isinstance(path := os.fspath(source), str):
         raise UsageError(f"{type(source).__name__}: is no path; give one, or what brakecli.load gave")
     return path
 
 
-def study_of(source: Any, settings: "Changes | None" = None) -> "LoadedStudy":
+def study_of(source: object, settings: "Changes | None" = None) -> "LoadedStudy":
     """The study of a path, or one that was loaded, which takes no settings."""
     from brakecli.api.inputs import load_study
     from brakecli.studies.scattering.study import LoadedStudy
@@ -80,7 +79,7 @@ def overrides(settings: "Changes | None") -> list[str]:
     return [f"{key}={_toml(value, key)}" for key, value in mapping(settings, "settings").items()]
 
 
-def axis_of(vary: "Mapping[Keys, Iterable[float] | Changes] | str") -> "Axis":
+def axis_of(vary: object) -> "Axis":
     """The axis along which modes are followed; raises UsageError where values neither rise nor fall."""
     import tomli_w
 
@@ -89,11 +88,12 @@ def axis_of(vary: "Mapping[Keys, Iterable[float] | Changes] | str") -> "Axis":
 
     if isinstance(vary, str):
         return _axis_of_text(vary)
-    if len(mapping(vary, "vary", several=True)) != 1:
+    along = mapping(vary, "vary", several=True)
+    if len(along) != 1:
         raise UsageError("vary: takes one key with its values, or one tuple of keys; give the others as settings")
-    [(keys, values)] = vary.items()
-    along = values if isinstance(values, Mapping) else {"values": values}
-    axis = parse_table(Axis, tomli_w.dumps(plain({"parameter": keys, **along}, "vary")), "vary")
+    [(keys, values)] = along.items()
+    settings = values if isinstance(values, Mapping) else {"values": values}
+    axis = parse_table(Axis, tomli_w.dumps(plain({"parameter": keys, **settings}, "vary")), "vary")
     places = axis.values or (axis.start or 0.0, axis.stop or 0.0)
     steps = [after - before for before, after in pairwise(places) if axis.numeric]
     if not axis.numeric or min(steps, default=1) * max(steps, default=1) <= 0:
@@ -118,7 +118,7 @@ def _axis_of_text(text: str) -> "Axis":
     raise UsageError(f"{argument('vary')} {printable(text)}: {what}; {remedy}")
 
 
-def axes_of(axes: Any, direction: Any) -> list[dict[str, Any]]:
+def axes_of(axes: object, direction: object) -> list[dict[str, object]]:
     """The tables `[[axis]]` of a sweep."""
     by_key = mapping(axes, "axes", several=True)
     ways = dict.fromkeys(by_key, direction) if isinstance(direction, str) and len(by_key) == 1 else direction
@@ -157,7 +157,7 @@ def patterns_of(keys: Any) -> list[str]:
     return patterns
 
 
-def margin_of(margin: Any) -> float:
+def margin_of(margin: object) -> float:
     """A margin of friction, as a part of it."""
     number = margin.item() if hasattr(margin, "item") else margin  # of NumPy
     if not (isinstance(number, int | float) and 0.0 <= number <= 10.0):
@@ -172,7 +172,7 @@ def chosen_of(choices: "Changes | None", name: str) -> list[str]:
     return [f"{key}={plain(value, f'{name}: {key}')}" for key, value in mapping(choices, name).items()]
 
 
-def text_of(text: Any, name: str) -> str:
+def text_of(text: object, name: str) -> str:
     """A text, empty for None; raises UsageError for anything else."""
     if not isinstance(text, str | None):
         raise UsageError(f"{name}: is no text{found_text(text)}; give one, or leave it out")
@@ -227,7 +227,7 @@ def points_of(points: "Mapping[str, Iterable[Any]] | None") -> "Listed | None":
     return Listed.of([*columns], columns.values())
 
 
-def scheduler_of(scheduler: Any) -> Any:
+def scheduler_of(scheduler: object) -> object:
     """The scheduler that is given, or the address in the environment; None without one."""
     if isinstance(scheduler, Real):
         raise UsageError(
@@ -246,7 +246,7 @@ def refuse_jobs(jobs: int | None) -> None:
         os._exit(os.EX_USAGE)  # which tells the caller that there is no guard
 
 
-def mapping(value: Any, name: str, *, several: bool = False) -> Mapping[Any, Any]:
+def mapping(value: object, name: str, *, several: bool = False) -> Mapping[Any, Any]:
     """A mapping by key paths, or by tuples of `several`; empty for None. Raises UsageError for anything else."""
     if not isinstance(value, Mapping | None):
         raise UsageError(f"{name}: is no mapping; write it as {{'friction.coefficient': ...}}")
@@ -256,7 +256,7 @@ def mapping(value: Any, name: str, *, several: bool = False) -> Mapping[Any, Any
     return value or {}
 
 
-def _toml(value: Any, key: str) -> str:
+def _toml(value: object, key: str) -> str:
     import tomli_w
 
     value = plain(value, key)
@@ -289,6 +289,6 @@ def plain(value: Any, key: str) -> Any:
         raise UsageError(f"{key}: cannot be set to {type(value).__name__}; give a number, text, list or table")
     if isinstance(value, str) and not value.isascii() and any(0xD800 <= ord(sign) < 0xE000 for sign in value):
         raise UsageError(f"{key}: is not UTF-8{found_text(value)}; write it in UTF-8")
-    if isinstance(value, int) and value.bit_length() >= _LARGEST_BITS:
+    if isinstance(value, int) and value.bit_length() >= 1024:  # no float, and too many digits to be written
         raise UsageError(f"{key}: is too large for a number{found_text(value)}; give a smaller one")
     return str(value) if isinstance(value, PathLike) else value

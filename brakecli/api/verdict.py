@@ -5,7 +5,7 @@ import difflib
 import math
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 from brakecli.api.measured import look_at, quantity_of
 from brakecli.api.records import Classify
@@ -14,6 +14,11 @@ from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
 from brakecli.faces import argument
 from brakecli.results.opening import is_hdf5
 
+if TYPE_CHECKING:
+    from brakecli.analysis.regime.decision import Thresholds
+    from brakecli.analysis.signals.table import SignalThresholds
+
+_Limits = TypeVar("_Limits", "Thresholds", "SignalThresholds")
 _GONE = {
     "decayed_to": "what becomes of the motion is computed",
     "reach_within": "settled_within holds for x, too",
@@ -35,7 +40,7 @@ def verdict_on(source: str, options: Classify) -> dict[str, Any]:
     return {**numbers, "quantity": quantity}
 
 
-def _on_result(source: str, thresholds: list[str] | None) -> dict[str, Any]:
+def _on_result(source: str, thresholds: list[str] | None) -> dict[str, object]:
     from brakecli.analysis.regime.decision import Thresholds
     from brakecli.studies.runs.stored import classify_result
 
@@ -52,7 +57,7 @@ def _on_result(source: str, thresholds: list[str] | None) -> dict[str, Any]:
         raise UnreadableResultError(f"{problem}; {remedy}; or {otherwise}") from error
 
 
-def changed(thresholds: type[Any], changes: list[str] | None) -> Any:
+def changed(thresholds: type[_Limits], changes: list[str] | None) -> _Limits:
     """Thresholds with the values of NAME=VALUE; raises UsageError for what is not one of them."""
     names = [field.name for field in dataclasses.fields(thresholds)]
     values: dict[str, float] = {}

@@ -20,12 +20,6 @@ from brakecli.solver.contact import EVALUATORS
 if TYPE_CHECKING:
     from brakecli.solver.coefficients import Coefficients
 
-PROFILE_ERROR = 0.01
-"""Part of the RMS of a measured profile that its sines leave out, where a case leaves it open."""
-SAMPLES_PER_CYCLE = 50.0
-SAMPLES_PER_WAVE = 10.0
-"""Samples in a period of the fastest motion, and of the shortest wave that passes, where a case leaves it open."""
-
 
 class Case(Table):
     """Everything that defines one simulation.
@@ -66,7 +60,8 @@ class Case(Table):
     def _put_sines(self) -> Iterator[Problem]:
         """Put sines beside measured profiles; yield a problem for each that cannot be used.
 
-        A surface with a profile counts as given by it alone, so that other settings may lead to other sines.
+        A surface with a profile counts as given by it alone, so that other settings may lead to other sines. They
+        leave out a hundredth of its RMS where the case leaves that open.
         """
         for side, surface in self.roughness:
             if surface is None or surface.profile is None or surface.amplitudes is not None:
@@ -74,7 +69,7 @@ class Case(Table):
             from brakecli.case.profile import sines_of
 
             pad = self.contact.half_length if side == "shoe" else None
-            error = PROFILE_ERROR if surface.profile_error is None else surface.profile_error
+            error = 0.01 if surface.profile_error is None else surface.profile_error
             try:
                 path = Path(surface.profile)
                 record = record_of(surface.profile)
@@ -161,14 +156,14 @@ class Case(Table):
             self.__dict__["output"] = Output.model_construct(set_keys, **self.output.model_dump() | interval)
 
     def _interval(self) -> float:
-        """Between samples (s), to two digits, by the fastest motion and the shortest wave that passes."""
+        """Between samples (s), to two digits: 50 in a period of the fastest motion, and 10 in a passing wave."""
         from brakecli.solver.links import natural_frequencies
 
         wheel = self.wheel
         _, fastest = natural_frequencies(self.coefficients, self.contact_stiffness)
         turns = [0.0] if self.roughness.wheel is None else surface_of(self.roughness.wheel, wheel.radius).turns
         speed = wheel.radius * max(map(abs, wheel.angular_speeds or (wheel.angular_speed or 0.0,)))
-        rate = max(SAMPLES_PER_CYCLE * fastest, SAMPLES_PER_WAVE * speed * float(max(turns, default=0.0)))
+        rate = max(50.0 * fastest, 10.0 * speed * float(max(turns, default=0.0)))
         return float(f"{min(max(1.0 / rate, tables.SMALLEST), tables.LARGEST):.1e}")
 
     @property

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import ConfigDict, Field, TypeAdapter, WrapValidator, create_model
 
@@ -13,7 +13,6 @@ from brakecli.solver.contact import EVALUATORS
 from brakecli.solver.method import MOST_EVALUATIONS
 from brakecli.solver.schemes import SCHEMES, Scheme
 
-DEFAULT_TOLERANCE = 1e-3  # relative error of the histories where a case gives neither step nor tolerance
 SETTLED: Literal["settled"] = "settled"
 """In place of a duration: the run goes on until its verdict is decided."""
 BUDGET = 100_000_000
@@ -26,7 +25,7 @@ beyond any machine."""
 _SECONDS = TypeAdapter[float](Positive, config=ConfigDict(strict=True, allow_inf_nan=False))
 
 
-def _or_settled(value: Any, handler: Any) -> Any:
+def _or_settled(value: object, handler: object) -> object:
     """A duration; with the errors of a number, as those of a choice between two kinds would name both."""
     return value if value == SETTLED else _SECONDS.validate_python(value)
 
@@ -186,7 +185,7 @@ class Solver(Table):
     @property
     def effective_tolerance(self) -> float | None:
         """Largest relative error that the histories may have; None where the step is given."""
-        return None if self.step is not None else self.tolerance or DEFAULT_TOLERANCE
+        return None if self.step is not None else self.tolerance or 1e-3
 
     def _broken_rules(self) -> Iterator[Problem]:
         yield from super()._broken_rules()

@@ -13,18 +13,12 @@ from brakecli.errors import UsageError, printable
 from brakecli.results.table import Array, TextTable, require
 
 _ROUNDING = 1e-12  # of heights, relative to their root mean square
-_GAP = 4.0  # median steps between two places from which on nothing was measured there
-_FITS = 0.005  # part of a turn by which a record may miss a whole number of turns
-_SEEN = 0.01  # per cent by which a record is stretched unsaid
-_NEAREST = 1e-9  # m; nothing is measured at places nearer to each other
-# m; no wheel is larger, and no height less
-_FARTHEST = 1e9
-_FLATTEST = 1e-15
-_MOST_PLACES = 10  # of the even grid for each that was measured
-_FEWEST = 8  # places in a turn: fewer show none of its waves but the longest three
+_FARTHEST = 1e9  # m; no wheel is larger
 
 
-def sines_of(name: str, record: Record, error: float, radius: float, pad: float | None) -> dict[str, Any]:
+def sines_of(
+    name: str, record: Record, error: float, radius: float, pad: float | None
+) -> dict[str, str | list[float]]:
     """The keys of a surface that leaves out a part `error` of the RMS of a measured profile of some name.
 
     `radius` (m) makes angles lengths. `pad` is the half length of a shoe (m); without one it is the profile of a
@@ -37,14 +31,15 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
     turn = 2.0 * math.pi * radius
     step = float(np.median(np.diff(places)))
     apart = f"its places lie {step:.3g} m apart, as a rule"
-    require(step >= _NEAREST, f"{apart}; check their unit")
+    require(step >= 1e-9, f"{apart}; check their unit")  # nothing is measured at places nearer to each other
     far = float(places[-1] - places[0])
     require(far <= _FARTHEST, f"its places reach over {far:.3g} m; check their unit")
     turns, around = _turns(places, step, turn) if pad is None else (0, 0.0)
+    most = 10 * len(places)  # of the even grid
     if turns:
-        count = min(round(around / step), _MOST_PLACES * len(places) // turns)
-        few = f"{apart}, {count} in a turn of {turn:.3g} m; check their unit, or measure {_FEWEST} or more"
-        require(count >= _FEWEST, few)
+        count = min(round(around / step), most // turns)
+        few = f"{apart}, {count} in a turn of {turn:.3g} m; check their unit, or measure 8 or more"
+        require(count >= 8, few)  # fewer show none of its waves but the longest three
         inside = places - places[0] < turns * around - 0.5 * step  # the last value may repeat the first
         grid = np.arange(turns * count) * (around / count)
         rows = np.interp(grid, (places - places[0])[inside], height[inside], period=turns * around)
@@ -53,11 +48,11 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
         profile = rows.mean(axis=0) - rows.mean()
         spread = float(np.sqrt(np.mean((rows - rows.mean(axis=0)) ** 2)))
         how = f", mean of {turns} turns, which differ from it by {spread:.3g} m (RMS)" * (turns > 1)
-        how += f"; the record was stretched by {stretched:.2g} % to whole turns" * (abs(stretched) > _SEEN)
+        how += f"; the record was stretched by {stretched:.2g} % to whole turns" * (abs(stretched) > 0.01)
         length = turn
     else:
         span = float(places[-1] - places[0])
-        count = min(round(span / step) + 1, _MOST_PLACES * len(places))
+        count = min(round(span / step) + 1, most)
         grid = np.linspace(0.0, span, count)
         profile = np.interp(grid, places - places[0], height)
         profile -= np.polyval(np.polyfit(grid, profile, 1), grid)
@@ -66,7 +61,7 @@ def sines_of(name: str, record: Record, error: float, radius: float, pad: float 
         if pad is not None and (places[0] > -pad + step or places[-1] < pad - step):
             how += f"; the pad from {-pad:g} to {pad:g} m reaches beyond {places[0]:.4g} to {places[-1]:.4g} m"
     widest = float(np.diff(places).max())
-    how += f"; a straight line bridges a gap of {widest:.3g} m" * (widest > _GAP * step)
+    how += f"; a straight line bridges a gap of {widest:.3g} m" * (widest > 4.0 * step)
     rms = float(np.sqrt(np.mean(profile**2)))
     straight = "its heights lie on a straight line, which is removed; leave the surface out, which is smooth"
     require(rms > _ROUNDING * float(np.abs(height).max()), straight)
@@ -134,17 +129,18 @@ def _checked(places: Array, height: Array, *, is_angle: bool) -> Record:
     require(steps.min() > 0.0, back)
     high = float(np.ptp(height))
     require(high > 0.0, "all heights are equal; leave the surface out, which is smooth")
-    require(high >= _FLATTEST, f"its heights differ by {high:.3g} m; check their unit")
+    require(high >= 1e-15, f"its heights differ by {high:.3g} m; check their unit")
     return Record(places.tobytes(), height.tobytes(), is_angle)
 
 
 def _turns(places: Array, step: float, turn: float) -> tuple[int, float]:
     """Whole turns in a record, and the length of each; a record that nearly is so many turns has their length."""
     span = float(places[-1] - places[0])
-    turns = math.floor((span + step) / turn + _FITS)
+    off = 0.005  # part of a turn by which a record may miss a whole number of turns
+    turns = math.floor((span + step) / turn + off)
     # The end may repeat the start.
     length = min((span + step, span), key=lambda length: abs(length - turns * turn))
-    fits = turns and abs(length - turns * turn) <= _FITS * turn
+    fits = turns and abs(length - turns * turn) <= off * turn
     return turns, length / turns if fits else turn
 
 

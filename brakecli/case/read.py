@@ -11,7 +11,7 @@ from functools import lru_cache
 from importlib import resources
 from io import BufferedReader
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TypeVar
 
 from pydantic import ValidationError
 
@@ -202,7 +202,7 @@ def parse_over_case(
 
 
 def put(
-    data: dict[str, Any], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath]
+    data: dict[str, object], path: tuple[str, ...], value: object, kind: type[Table], kept: Container[KeyPath]
 ) -> list[tuple[str, ...]]:
     """Set a key in the data of a table of some kind; the paths of the tables that were created for it.
 
@@ -210,7 +210,7 @@ def put(
     that the new one makes needless. Raises `CaseError` where something on the path is not a table.
     """
     *parents, key = path
-    table: Any = data
+    table: object = data
     created = []
     for end, parent in enumerate(parents, start=1):
         if isinstance(table, dict):

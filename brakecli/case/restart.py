@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import Generic, TypeVar
 
 from pydantic import ValidationError
 
@@ -28,7 +28,7 @@ class End(Generic[_Case]):
     state: list[float]
 
 
-def last_of(path: Path, case_of: Callable[[Any], _Case]) -> End[_Case]:
+def last_of(path: Path, case_of: Callable[[object], _Case]) -> End[_Case]:
     """The end of a run; the one reader of it. `case_of` makes a case of its resolved table.
 
     Raises UnreadableResultError for what is no run, and UsageError for one that has failed.

@@ -1,12 +1,12 @@
 """Rough surfaces as users know them: sines, orders of a turn, or a self-affine spectrum."""
 
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
@@ -86,7 +86,7 @@ class Spectrum(Table):
             (too_large, "rms", "is too large for the amplitudes of its sines", "check its unit, m"),
         )
 
-    def sines(self) -> dict[str, Any]:
+    def sines(self) -> dict[str, list[float]]:
         """The lists of its sines, the longest wave first; the sum of their mean squares is that of the heights."""
         import numpy as np
 
@@ -150,7 +150,7 @@ class Profile(Table):
         """Whether a sine has an amplitude."""
         return bool(self.spectrum.rms) if self.spectrum else any(self.amplitudes or ())
 
-    def sines(self) -> dict[str, Any]:
+    def sines(self) -> dict[str, Sequence[float]]:
         """The lists of its sines, by the names of their keys."""
         lists = {key: value for key in _SINES if (value := getattr(self, key, None)) is not None}
         return {**self.spectrum.sines(), **lists} if self.spectrum else lists

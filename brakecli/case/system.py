@@ -11,10 +11,6 @@ from brakecli.solver.system import Initial, System
 
 _SMOOTH = surface()
 EVENT_TOLERANCE = 1e-10  # of event-driven where a case gives it a step
-FIRST_CYCLES = 250.0
-FIRST_SAMPLES = 500_000.0
-"""Periods of the slowest mode in the first run of a case that is to settle, and its samples at most. A window of
-its envelope, a fortieth of it, then holds six of them."""
 
 
 def system_of(case: Case) -> System:
@@ -31,7 +27,8 @@ def system_of(case: Case) -> System:
     if initial.wheel_angle and wheel_surface.g.size:
         wheel_surface = turned(wheel_surface, initial.wheel_angle * wheel.radius)
     slow, fast = natural_frequencies(case.coefficients, case.contact_stiffness)
-    first = min(FIRST_CYCLES / (slow or fast), FIRST_SAMPLES * case.output.sample_interval)
+    # First run of a case that is to settle: a window of its envelope, a fortieth of it, holds six slow periods.
+    first = min(250.0 / (slow or fast), 500_000.0 * case.output.sample_interval)
     rough = shoe.g.size or wheel_surface.g.size  # where a tolerance may change the scheme
     return System(
         coefficients=case.coefficients,

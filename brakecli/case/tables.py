@@ -33,20 +33,20 @@ MOST_SINES = 2000  # of a surface that is not given as sines: a resolved case mu
 MISSING = "is missing"
 
 
-def described(description: str, default: Any = ..., **options: Any) -> Any:
+def described(description: str, default: object = ..., **options: Any) -> Any:
     """A key, which is required if it has no default."""
     return Field(default, description=description, **options)
 
 
-def quantity(unit: str, description: str, default: Any = ..., **options: Any) -> Any:
+def quantity(unit: str, description: str, default: object = ..., **options: Any) -> Any:
     """A key that holds a number or numbers."""
     return described(description, default, json_schema_extra={"unit": unit}, **options)
 
 
-def one_of(names: Callable[[], Iterable[str]]) -> tuple[Any, ...]:
+def one_of(names: Callable[[], Iterable[str]]) -> tuple[object, ...]:
     """A text that is one of some names. They are asked for at every check, so that a row may join a registry."""
 
-    def checked(value: Any) -> Any:
+    def checked(value: object) -> object:
         if value not in tuple(names()):
             raise PydanticCustomError("enum", "is not one of the choices")
         return value
@@ -62,7 +62,7 @@ def _within_scale(value: float) -> float:
     return value
 
 
-def _few_errors(values: Any, handler: Callable[[Any], Any]) -> Any:
+def _few_errors(values: object, handler: Callable[[object], object]) -> object:
     """Report only the first wrong entries of a list: thousands of them help nobody, and take seconds."""
     try:
         return handler(values)
@@ -92,7 +92,7 @@ Schedule = Annotated[tuple[Number, ...], Field(min_length=1), *from_list]
 Title = Annotated[str, Field(pattern=r"^[^\x00-\x1f\x7f-\x9f]*$", description="one line for people to read")]
 
 
-def _add_alternatives(schema: dict[str, Any], kind: "type[Table]") -> None:
+def _add_alternatives(schema: JsonSchemaValue, kind: "type[Table]") -> None:
     if groups := [{"required": [*group]} for group in kind.alternatives]:
         schema |= {"oneOf": groups} if kind.one_is_needed else {"not": {"allOf": groups}}
 
@@ -148,7 +148,7 @@ class Table(BaseModel):
         """The problem with the value of a key, which may be one of an inner table: `output.sample_interval`."""
         return Problem(tuple(key.split(".")), what + found_text(attrgetter(key)(self)), remedy)
 
-    def broken(self, *rules: tuple[Any, str, str, str]) -> Iterator[Problem]:
+    def broken(self, *rules: tuple[object, str, str, str]) -> Iterator[Problem]:
         """Yield a problem for each rule that is broken: whether it is, then the key, what is wrong, what to do."""
         yield from (self.wrong(*problem) for broken, *problem in rules if broken)
 
@@ -157,7 +157,7 @@ class Table(BaseModel):
 
     @model_validator(mode="wrap")
     @classmethod
-    def _find_every_problem(cls, data: Any, handler: Callable[[Any], Self]) -> Self:
+    def _find_every_problem(cls, data: object, handler: Callable[[object], Self]) -> Self:
         """Check the rules between keys even where some keys are wrong by themselves, and report all at once."""
         if isinstance(data, cls):
             return data  # valid by construction
@@ -198,13 +198,13 @@ class OverCase(Table):
 
 
 @cache
-def _adapter(kind: type[Table], key: str) -> TypeAdapter[Any]:
+def _adapter(kind: type[Table], key: str) -> TypeAdapter[object]:
     """What makes the value of one key."""
     form: Any = Annotated[kind.model_fields[key].annotation, kind.model_fields[key]]
     return TypeAdapter(form)
 
 
-def entries(values: tuple[Any, ...]) -> str:
+def entries(values: tuple[object, ...]) -> str:
     """How many entries a list has, in words."""
     return "1 entry" if len(values) == 1 else f"{len(values)} entries"
 
@@ -248,7 +248,7 @@ class _TomlSchema(GenerateJsonSchema):
         return described
 
 
-def json_schema(kind: type[Table]) -> dict[str, Any]:
+def json_schema(kind: type[Table]) -> JsonSchemaValue:
     """The JSON Schema (draft 2020-12) of a kind of table, such as a whole case file.
 
     It accepts everything that is valid; most rules between keys are beyond it.
@@ -257,12 +257,12 @@ def json_schema(kind: type[Table]) -> dict[str, Any]:
 
 
 @cache
-def _schema_with(kind: type[Table], names: tuple[str, ...]) -> dict[str, Any]:
+def _schema_with(kind: type[Table], names: tuple[str, ...]) -> JsonSchemaValue:
     """The schema as it is while the registries hold these names."""
     return {"$schema": _TomlSchema.schema_dialect, **kind.model_json_schema(schema_generator=_TomlSchema)}
 
 
-def key_schema(kind: type[Table], path: KeyPath) -> dict[str, Any]:
+def key_schema(kind: type[Table], path: KeyPath) -> JsonSchemaValue:
     """The JSON Schema of one key of a table, of an inner table, or of an entry of a list; its unit is included."""
     schema = node = json_schema(kind)
     for step in path:

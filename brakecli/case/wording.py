@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from dataclasses import replace
 from difflib import get_close_matches
-from typing import Any
 
 from pydantic import ValidationError
+from pydantic.json_schema import JsonSchemaValue
 
 from brakecli.case.tables import LARGEST, MISSING, SMALLEST, Table, key_schema, tables_within
 from brakecli.errors import KeyPath, Problem, found_text, key_text
@@ -26,9 +26,6 @@ _WHAT = {
     "magnitude": f"is not between {SMALLEST:g} and {LARGEST:g} in magnitude",
 }
 """The kinds of error that pydantic reports for one value of a case."""
-# least likeness of a misspelt key; in its own table less is enough: nmu for num
-_LIKE = 0.7
-_LIKE_HERE = 0.65
 _TEXT = "one line of text in quotes"
 _KINDS = {"number": "a number", "integer": "a whole number", "boolean": "true or false", "string": _TEXT}
 
@@ -90,9 +87,10 @@ def _meant(path: KeyPath, tables: dict[KeyPath, type[Table]]) -> list[KeyPath]:
     key = str(path[-1])
     names = dict.fromkeys(name for kind in tables.values() for name in kind.model_fields)
     if key not in names:
-        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=_LIKE_HERE):
+        # less likeness is enough in its own table: nmu for num
+        if near := get_close_matches(key, tables[parent].model_fields, n=1, cutoff=0.65):
             return [(*path[:-1], near[0])]
-        key = next(iter(get_close_matches(key, names, n=1, cutoff=_LIKE)), "")
+        key = next(iter(get_close_matches(key, names, n=1, cutoff=0.7)), "")
     return [(*table, key) for table, kind in tables.items() if key in kind.model_fields]
 
 
@@ -143,12 +141,12 @@ def _expected(path: KeyPath, kind: type[Table]) -> str:
     return text if node.get("unit") in (None, "1") else f"{text}, in {node['unit']}"
 
 
-def _required(node: dict[str, Any]) -> list[str]:
+def _required(node: JsonSchemaValue) -> list[str]:
     """The keys that a table needs, by its JSON Schema; of groups that exclude each other, those of the first."""
     return [*node.get("required", []), *node.get("oneOf", [{}])[0].get("required", [])]
 
 
-def _value(node: dict[str, Any]) -> str:
+def _value(node: JsonSchemaValue) -> str:
     text = _KINDS.get("integer" if "multipleOf" in node else node.get("type", ""), "a value")
     if "exclusiveMinimum" in node:
         return f"{text} above {node['exclusiveMinimum']:.9g}"

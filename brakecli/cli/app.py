@@ -45,8 +45,6 @@ CITATION = f"""\
 """How to cite the program and the paper, in BibTeX; CITATION.cff says the same."""
 
 SETTINGS = {"help_option_names": ["-h", "--help"]}
-INDENT = 6
-"""Columns of `--help` beside names and descriptions of commands."""
 LIBRARIES = 1_075_000_000
 """Bytes of address space for the libraries and compiled kernels; to compile these takes `compiling.KERNELS`."""
 
@@ -71,7 +69,7 @@ class Grouped(TyperGroup):
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a section for each group."""
         longest = max(map(len, self.list_commands(ctx)))
-        limit = formatter.width - longest - INDENT
+        limit = formatter.width - longest - 6  # columns beside names and descriptions
         for title, names in GROUPS.items():
             with formatter.section(title):
                 rows = [

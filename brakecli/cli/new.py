@@ -60,7 +60,7 @@ def command(options: New, quiet: Quiet = False) -> None:
     if near and starter not in texts:
         remedy = f"did you mean {near[0]}? A file of that name has the option -o"
         raise UsageError(f"no starter is called {printable(starter)}; {remedy}")
-    base = text.partition('\ncase = "')[2].partition('"')[0]
+    base = text.partition('\ncase = "')[2].partition('"')[0]  # of a sweep or a study
     brake = Brake(options.mass, options.frequency, options.load, options.speed, options.friction)
     of_brake = None
     if brake != Brake():
@@ -70,7 +70,6 @@ def command(options: New, quiet: Quiet = False) -> None:
         of_brake = similar(starter if starter in texts else "case", text, brake)
         text = of_brake.text
         warn(*_slips(options, text))
-    # a sweep or a study has a base
     written = {path: text}
     if base and not (path.parent / base).exists():
         written[path.parent / base] = texts[base.removesuffix(".toml")]
@@ -96,14 +95,14 @@ def _slips(options: New, text: str) -> Iterator[str]:
     from brakecli.api.commands import slips_in
     from brakecli.case.read import parse_case
 
-    given = {
-        "shoe.mass": options.mass,
-        "load.force": options.load,
-        "wheel.angular_speed": options.speed,
-        "friction.coefficient": options.friction,
+    numbers = {
+        "shoe.mass": ("--mass", options.mass),
+        "load.force": ("--load", options.load),
+        "wheel.angular_speed": ("--speed", options.speed),
+        "friction.coefficient": ("--friction", options.friction),
     }
-    names = dict(zip(given, ("--mass", "--load", "--speed", "--friction"), strict=True))
-    for each in slips_in(parse_case(text, "the new case")):
-        key, _, said = each.partition(": ")
-        if given.get(key) is not None:
-            yield f"{names[key]}: {said}"
+    for warning in slips_in(parse_case(text, "the new case")):
+        key, _, said = warning.partition(": ")
+        option, number = numbers.get(key, ("", None))
+        if number is not None:
+            yield f"{option}: {said}"

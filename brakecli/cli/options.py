@@ -3,7 +3,7 @@
 import inspect
 from collections.abc import Callable
 from functools import partial, wraps
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
@@ -28,7 +28,7 @@ def with_options(command: Callable[..., None]) -> Callable[..., None]:
     ]
 
     @wraps(command)
-    def called(**arguments: Any) -> None:
+    def called(**arguments: object) -> None:
         options = record(**{parameter.name: arguments.pop(parameter.name) for parameter in shared})
         command(options, **arguments)
 
@@ -66,7 +66,7 @@ def _number(unit: str, text: str) -> float:
         raise typer.BadParameter(f"{printable(text)} is no number{f' in {unit}' if unit else ''}") from None
 
 
-def _plain_type(annotation: Any) -> Any:
+def _plain_type(annotation: object) -> type:
     """The first type of an annotation that the shell has; it gives anything else as text."""
     return next((kind for kind in (bool, int, float) if annotation in (kind, kind | None)), str)
 

@@ -4,7 +4,7 @@ import json
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from brakecli.api.progress import say, telling
 from brakecli.results.os_signals import Styled
@@ -19,7 +19,7 @@ def show(text: str) -> None:
     print(text, flush=True)  # noqa: T201
 
 
-def show_json(value: Mapping[str, Any], indent: int | None = None) -> None:
+def show_json(value: Mapping[str, object], indent: int | None = None) -> None:
     """Print a result as JSON, in ASCII if standard output is not UTF-8."""
     utf8 = (sys.stdout.encoding or "").lower() in ("utf-8", "utf8")
     show(json.dumps(value, allow_nan=False, ensure_ascii=not utf8, indent=indent))
@@ -27,7 +27,7 @@ def show_json(value: Mapping[str, Any], indent: int | None = None) -> None:
 
 def show_result(
     command: str,
-    numbers: Mapping[str, Any],
+    numbers: Mapping[str, object],
     view: "Callable[[Renderer], View]",
     *,
     as_json: bool,
