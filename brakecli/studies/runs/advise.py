@@ -143,17 +143,17 @@ class AdviceReport:
             searched = "" if self.system.smooth else f", up to {LARGEST_FRICTION:g}"
             yield f"stable: no friction makes it unstable{searched}"
 
-    def _scattered(self, left: Left) -> str:
+    def _scattered(self, squeal: Left) -> str:
         """How many brakes squeal that are built to the drawing."""
-        but = "but " if self.stability.stable and left.squeal_lower > 0.0 else ""
+        but = "but " if self.stability.stable and squeal.squeal_lower > 0.0 else ""
         those = "brakes built to this drawing" if self.stability.stable else "such brakes"
-        return f"{but}under a scatter {self.scatter} {self._part(left, f' of {those}')}"
+        return f"{but}under a scatter {self.scatter} {self._share(squeal, f' of {those}')}"
 
-    def _part(self, left: Left, those: str = "") -> str:
+    def _share(self, squeal: Left, those: str = "") -> str:
         """Which part squeals, in the band if there is one, and what is unstable beside it."""
         there = f"between {self.band[0]:g} and {self.band[1]:g} Hz" if self.band and those else "in that band"
-        said = f"{part_of(left)}{those} squeal" + f" {there}" * (self.band is not None)
-        beside = left.unstable_elsewhere or 0.0
+        said = f"{part_of(squeal)}{those} squeal" + f" {there}" * (self.band is not None)
+        beside = squeal.unstable_elsewhere or 0.0
         return f"{said}, and {percent(beside)} {self.elsewhere}" if self.elsewhere and beside > 0.0 else said
 
     def _remedy(self) -> Iterator[str]:
@@ -167,11 +167,11 @@ class AdviceReport:
         effect = "takes the instability away"
         if critical is not None:
             effect = f"moves the loss of stability to {critical:.3g}"
-        squealing = "" if best.squeal is None else f", and {self._part(best.squeal)}"
+        squealing = "" if best.squeal is None else f", and {self._share(best.squeal)}"
         yield f"{best.parameter} {best.start:.4g} → {best.rounded} {effect}{squealing}"
         mildest = next((change for change in self.advice if change.parameter == self.mildest), best)
         if mildest.parameter != best.parameter and mildest.squeal:
-            yield f"{mildest.parameter} → {mildest.rounded} leaves least: {self._part(mildest.squeal)}"
+            yield f"{mildest.parameter} → {mildest.rounded} leaves least: {self._share(mildest.squeal)}"
         if self.in_vain:
             yield f"no change listed {self.in_vain} how many are unstable: try a larger --margin, or damping"
         if best.check is None:
@@ -190,14 +190,14 @@ class Words(str):
         return str(self)
 
 
-def part_of(left: Left) -> str:
+def part_of(squeal: Left) -> str:
     """The share that squeals, with its 95 % interval where that leaves no second digit sure."""
-    upper = percent(left.squeal_upper)
-    if not left.is_vague:
-        return percent(left.squeal_probability)
-    if left.squeal_probability == 0.0:
+    upper = percent(squeal.squeal_upper)
+    if not squeal.is_vague:
+        return percent(squeal.squeal_probability)
+    if squeal.squeal_probability == 0.0:
         return f"at most {upper}"
-    return f"{percent(left.squeal_probability)} (95 %: {percent(left.squeal_lower)[:-2]} to {upper})"
+    return f"{percent(squeal.squeal_probability)} (95 %: {percent(squeal.squeal_lower)[:-2]} to {upper})"
 
 
 def _far(margin: float | None, own: float) -> str:

@@ -78,11 +78,11 @@ def judged(report: AdviceReport) -> AdviceReport:
     return replace(report, helpful=helpful, mildest=mildest, in_vain=vain)
 
 
-def _is_better(left: Left | None, other: Left | None) -> bool:
+def _is_better(squeal: Left | None, other: Left | None) -> bool:
     """Whether fewer of the same brakes are surely unstable."""
-    if left is None or other is None or left.unstable is None or other.unstable is None:
+    if squeal is None or other is None or squeal.unstable is None or other.unstable is None:
         return False
-    return surely_fewer(left.unstable, other.unstable)
+    return surely_fewer(squeal.unstable, other.unstable)
 
 
 def _tied(changes: list[Change]) -> list[Change]:
@@ -95,9 +95,9 @@ def _tied(changes: list[Change]) -> list[Change]:
     return ties + _tied([change for change in changes if change.parameter not in names])
 
 
-def _share(left: Left | None) -> float:
+def _share(squeal: Left | None) -> float:
     """The part of the brakes that is unstable."""
-    return np.inf if left is None or left.unstable is None else float(left.unstable.mean())
+    return np.inf if squeal is None or squeal.unstable is None else float(squeal.unstable.mean())
 
 
 def _squeal(case: Case) -> Left | None:
@@ -163,8 +163,8 @@ def _frequencies(case: Case) -> Floats | None:
     roots = np.linalg.eigvals(motion)
     growth = np.where((roots.real > 0.0) & (roots.imag > 0.0), roots.real, 0.0)
     first = growth.argmax(axis=-1)[..., None]
-    found = np.where(growth > 0.0, roots.imag, 0.0) / (2.0 * np.pi)
-    return np.asarray(np.take_along_axis(found, first, axis=-1)[..., 0])
+    frequencies = np.where(growth > 0.0, roots.imag, 0.0) / (2.0 * np.pi)
+    return np.asarray(np.take_along_axis(frequencies, first, axis=-1)[..., 0])
 
 
 def about(case: Case) -> Study:

@@ -36,8 +36,8 @@ class _Law(NamedTuple):
     above: bool
 
     @property
-    def kept(self) -> float:
-        """The probability of what is kept."""
+    def probability(self) -> float:
+        """That of what is kept."""
         return abs(self.last - self.first)
 
 
@@ -73,7 +73,6 @@ class Parameter(Table):
                 yield from self._wrong_key(name, text)
         normal = self.distribution == "normal"
         bounded = self.distribution in ("uniform", "triangular")
-        spread = self.mean is not None
         for one, other in (("low", "high"), ("mean", "deviation")):
             alone = [name for name in (one, other) if name in present]
             if len(alone) == 1:
@@ -85,23 +84,25 @@ class Parameter(Table):
         low = self.low
         high = self.high
         mode = self.mode
-        sound = low is None or high is None or low < high
-        has_mode = self.distribution == "triangular" and low is not None and high is not None
-        beside = mode is not None and low is not None and high is not None and not low <= mode <= high
+        limited = low is not None and high is not None
+        rising = low is None or high is None or low < high
+        takes_mode = self.distribution == "triangular" and limited
+        outside = mode is not None and low is not None and high is not None and not low <= mode <= high
         keep = "keep one of the two"
         others = " and ".join(present[:-1])
-        in_part = self.tolerance_percent is not None and len(present) > 1
+        both = self.tolerance_percent is not None and len(present) > 1
+        both_limits = bounded and self.mean is not None and low is not None
         only = "is only for a triangular distribution with low and high"
         yield from self.broken(
-            (in_part, "tolerance_percent", f"is given together with {others}", keep),
-            (bounded and spread and low is not None, "mean", "is given together with low and high", keep),
-            (not sound, "high", "is not above low", "give a range"),
-            (mode is not None and not has_mode, "mode", only, "leave it out"),
-            (has_mode and beside, "mode", "is not between low and high", "give a value between them"),
+            (both, "tolerance_percent", f"is given together with {others}", keep),
+            (both_limits, "mean", "is given together with low and high", keep),
+            (not rising, "high", "is not above low", "give a range"),
+            (mode is not None and not takes_mode, "mode", only, "leave it out"),
+            (takes_mode and outside, "mode", "is not between low and high", "give a value between them"),
         )
         positive = all(value is None or value > 0.0 for value in (low, self.mean))
-        cut = not bounded and None not in (self.mean, self.deviation, self.low, self.high)
-        if cut and sound and (normal or positive) and not self._law.kept > 1e-12:
+        cut = not bounded and limited and None not in (self.mean, self.deviation)
+        if cut and rising and (normal or positive) and not self._law.probability > 1e-12:
             yield self.wrong("low", "and high lie where no value falls", "take limits nearer to the mean")
         if self.distribution == "lognormal":
             for name in ("low", "mean"):
