@@ -7,7 +7,6 @@ import resource
 import signal
 import subprocess
 import sys
-import zlib
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -144,12 +143,6 @@ def test_an_unknown_way_to_compile_is_told(
     assert told == ["BRAKECLI_COMPILE: unknown value (found 'later'); it may be 'lazy'"]
 
 
-def test_a_folder_that_has_vanished_is_made_again(made: list[Path], tmp_path: Path) -> None:
-    assert beforehand.prepare(tmp_path / "a" / "b", FACTS) == ""
-    assert made == [tmp_path / "a" / "b"]
-    assert (tmp_path / "a" / "b").stat().st_mode & 0o777 == 0o700
-
-
 def _fifo(path: Path) -> None:
     os.mkfifo(path)
 
@@ -173,8 +166,10 @@ def _folder(path: Path) -> None:
     (path / "file").touch()
 
 
-@pytest.mark.parametrize("make", [_fifo, _deep, _long, _link, _folder])
-@pytest.mark.parametrize("name", [MANIFEST, "total", "a.part/a.nbi", "a.part/a.1.nbc"])
+@pytest.mark.parametrize(
+    ("make", "name"),
+    [(_fifo, MANIFEST), (_deep, MANIFEST), (_long, "total"), (_link, "a.part/a.nbi"), (_folder, "a.part/a.1.nbc")],
+)
 def test_whatever_is_in_the_place_of_a_file_is_replaced(
     made: list[Path], tmp_path: Path, make: Callable[[Path], None], name: str
 ) -> None:
@@ -229,16 +224,6 @@ def test_children_that_fail_leave_no_manifest_and_their_last_line(
     assert not (cache / MANIFEST).exists()
 
 
-def test_a_complete_set_counts_though_a_child_was_killed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    script = 'mkdir "$5/a.b"; echo code > "$5/a.b/a.1.nbc"; printf 1 > "$5/total"; '
-    script += f'echo \'{{"a.1.nbc": [5, {zlib.crc32(b"code" + bytes([10]))}]}}\' > "$5/a.b/stamp.json"; kill -9 $$'
-    monkeypatch.delenv(HOW, raising=False)
-    monkeypatch.setattr(sys, "executable", _interpreter(tmp_path, script))
-    cache = tmp_path / "cache"
-    assert beforehand.prepare(cache, FACTS) == ""
-    assert (cache / MANIFEST).exists()
-
-
 def test_children_look_for_modules_where_this_process_does_but_not_in_its_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -284,31 +269,6 @@ def test_one_who_comes_while_another_compiles_waits_and_sees_how_far_it_is(
         finally:
             compiling.set_progress(None)
     assert told == [(1, 7), (1, 7)]
-    assert made == [tmp_path]
-
-
-def test_one_who_waits_sees_that_all_are_there_though_the_lock_is_held_on(
-    made: list[Path], tmp_path: Path
-) -> None:
-    """As by a process that was forked by the one that compiled."""
-    beforehand.prepare(tmp_path, FACTS)
-    manifest = (tmp_path / MANIFEST).read_bytes()
-    beforehand.forget(tmp_path)
-
-    @contextmanager
-    def shown(seconds: float) -> Iterator[compiling.Tell]:
-        def tell(done: int, total: int) -> None:
-            (tmp_path / MANIFEST).write_bytes(manifest)
-
-        yield tell
-
-    compiling.set_progress(shown)
-    with (tmp_path / "beforehand.lock").open("w") as lock:
-        fcntl.flock(lock, fcntl.LOCK_EX)
-        try:
-            assert beforehand.prepare(tmp_path, FACTS) == ""
-        finally:
-            compiling.set_progress(None)
     assert made == [tmp_path]
 
 

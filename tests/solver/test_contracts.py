@@ -19,7 +19,7 @@ from brakecli.solver.coefficients import Coefficients
 from brakecli.solver.contact import auto, cells, closed_form, exact, midpoint
 from brakecli.solver.contact.force import fill
 from brakecli.solver.contact.pad import build_layer, build_pad
-from brakecli.solver.records import MOST_KINDS, Problem, Weights, Works, new
+from brakecli.solver.records import MOST_KINDS, Problem, Weights, new
 from brakecli.solver.roughness import surface
 from brakecli.solver.steps import event_driven, piecewise_exact, three_layer, two_layer
 from brakecli.solver.steps.implicit import SOLVED, newton
@@ -214,39 +214,6 @@ def test_a_scheme_starts_at_the_given_state(name: str) -> None:
     assert links == pytest.approx(0.5 * (c.c_xx * x * x + 2 * c.c_xy * x * y + c.c_yy * y * y), rel=0.2)
     assert position == pytest.approx((x, y), rel=0.1)
     assert back in (0.0, 0.5)
-
-
-@pytest.mark.parametrize("name", STEPPING)
-def test_a_scheme_s_kernels_pose_a_definite_problem_and_take_its_solution(name: str) -> None:
-    scheme: Any = load(name.replace("_", "-"))
-    checked = 0
-    for theta in weights_of(name):
-        weights = Weights(1e-5, *(*theta, 0.0, 0.0, 0.0)[:3])
-        state = new(scheme.STATE)
-        problem: Any = new(Problem)
-        work: Any = new(Works)
-        scheme.begin(weights, state, *START)
-        for field in Problem.layout.names or ():
-            problem[field] = np.nan
-        problem.load = 5e3
-        problem.belt_now = 1.0
-        problem.belt_next = 1.0
-        scheme.prepare(COEFFICIENTS, weights, state, problem)
-        assert problem.a_11 > 0
-        assert problem.a_11 * problem.a_22 > problem.a_12**2
-        assert problem.gain > 0
-        pad = build_pad(1e8, 0.05, surface(), surface(), 0)
-        layer = build_layer("closed-form", pad)
-        assert newton(*layer, problem, 100)[0] == SOLVED
-        assert np.isfinite(problem.tolist()).all()
-        before = state.copy()
-        scheme.finish(COEFFICIENTS, weights, state, problem, layer.contact, work)
-        assert np.isfinite(state.tolist()).all()
-        assert np.isfinite(work.tolist()).all()
-        assert (state.x_old, state.y_old) == (before.x, before.y)
-        assert state.x != before.x
-        checked += 1
-    assert checked == 3
 
 
 def test_more_evaluators_than_a_run_can_count_are_refused(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -55,7 +55,7 @@ def by_events(system: System, tolerance: float) -> Motion:
     return solve(system, Method("event-driven", evaluator="midpoint", nodes=system.nodes, tolerance=tolerance))
 
 
-@pytest.mark.parametrize("lanes", counts(12, 200))
+@pytest.mark.parametrize("lanes", counts(12, 60))
 def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
     """To what half a step leaves of the error; the iteration leaves less than 5e-6.
 
@@ -89,20 +89,6 @@ def test_a_lane_gives_the_motion_on_its_nodes(lanes: int) -> None:
     assert (np.max(errors, axis=0) <= [5e-5, 1e-5]).all()
 
 
-def test_errors_in_a_lane_fall_with_the_third_power_of_the_step() -> None:
-    """Where the pad touches everywhere; patches that begin and end are kinks."""
-    full = system(step=2.5e-5, tolerance=1e-13, load__force=5e4, initial__at="equilibrium", initial__vx=0.05)
-    exact = solve(full, Method("event-driven", tolerance=1e-13))
-    errors = list[float]()
-    for halvings in range(4):
-        shorter = replace(full.method, step=2.5e-5 / 2**halvings)
-        (found,) = run_together([replace(full, method=shorter)])
-        assert found is not None
-        errors.append(apart(found, exact))
-    assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(3.0, abs=0.15)
-    assert errors[-1] < 2e-9
-
-
 def test_a_run_does_not_depend_on_the_lanes_beside_it() -> None:
     rng = np.random.default_rng(6)
     strangers = [drawn(rng) for _ in range(LANES + 5)]
@@ -117,14 +103,6 @@ def test_a_run_does_not_depend_on_the_lanes_beside_it() -> None:
                 continue
             assert found.rows.tobytes() == before.rows.tobytes()
             assert found.work.contact_evaluations == before.work.contact_evaluations
-
-
-def test_fewer_waves_and_a_smooth_shoe_are_the_same_in_a_lane() -> None:
-    waves = {"amplitudes": [3e-5], "wavelengths": [0.023], "phases_deg": [40.0]}
-    one = system(5e-6, tolerance=1e-9, roughness__wheel=waves, roughness__shoe=None, initial__at="equilibrium")
-    (found,) = run_together([one])
-    assert found is not None
-    assert apart(found, by_events(one, 1e-11)) <= 1e-7
 
 
 @pytest.mark.parametrize(

@@ -1,18 +1,15 @@
 """The minimisation that a step comes down to: against brute force, its optimality and the edges of stick."""
 
 import math
-from importlib import import_module
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from brakecli.solver.friction import minimise, slopes
 from tests.campaign import campaign
 
-mpmath: Any = import_module("mpmath")  # imported so because it has no type hints
 EPS = 2.0**-52
 magnitudes = st.floats(-6, 6).map(lambda power: 10.0**power)
 signed = st.one_of(st.just(0.0), magnitudes, magnitudes.map(lambda value: -value))
@@ -45,51 +42,6 @@ def rounding_of_e(problem: Problem) -> float:
     a = a_11 * a_22 - a_12**2
     terms = (abs(g_2) * a_11 + abs(g_1 * a_12) + g_0 * abs(a_12)) / a
     return 4 * EPS * (terms * (a_11 * a_22 + a_12**2) / a + (abs(g_2) + abs(a_12 * belt)) / a_22)
-
-
-def golden_section(problem: Problem) -> tuple[float, float, float]:
-    """(d, e) where J is least, by search in d alone with e eliminated exactly, and the bracket left of d.
-
-    J is flat there, so that its 60 digits place d to 30.
-    """
-    with mpmath.workdps(60):
-        a_11, a_12, a_22, g_1, g_2, g_0, belt = map(mpmath.mpf, problem)
-
-        def e_of(d: Any) -> Any:
-            return (g_2 - a_12 * d) / a_22
-
-        def lowest(d: Any) -> Any:
-            e = e_of(d)
-            quadratic = (a_11 * d * d + a_22 * e * e) / 2 + a_12 * d * e
-            return quadratic - g_1 * d - g_2 * e + g_0 * abs(d - belt)
-
-        part = (mpmath.sqrt(5) - 1) / 2
-        reach = abs(belt) + 10 * (abs(g_1) + abs(g_2 * a_12 / a_22) + g_0) * a_22 / (a_11 * a_22 - a_12**2) + 1
-        low = -reach
-        high = reach
-        inner = [high - part * (high - low), low + part * (high - low)]
-        values = [lowest(inner[0]), lowest(inner[1])]
-        while high - low > mpmath.mpf(10) ** -25 * reach:
-            if values[0] < values[1]:
-                high = inner[1]
-                inner = [inner[1] - part * (inner[1] - low), inner[0]]
-                values = [lowest(inner[0]), values[0]]
-            else:
-                low = inner[0]
-                inner = [inner[1], inner[0] + part * (high - inner[0])]
-                values = [values[1], lowest(inner[1])]
-        d = (low + high) / 2
-        return float(d), float(e_of(d)), float(high - low)
-
-
-@given(problems())
-@settings(max_examples=80)
-def test_the_minimiser_is_where_a_search_finds_it(problem: Problem) -> None:
-    d, e, _ = minimise(*problem)
-    expected_d, expected_e, bracket = golden_section(problem)
-    assert d == pytest.approx(expected_d, rel=0, abs=rounding(problem) + bracket)
-    slack = rounding_of_e(problem) + abs(problem[1]) / problem[2] * bracket
-    assert e == pytest.approx(expected_e, rel=0, abs=slack)
 
 
 @given(problems())

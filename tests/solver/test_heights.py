@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
-from fractions import Fraction
 from typing import Any
 
 import numpy as np
@@ -77,24 +76,6 @@ def test_a_window_gives_the_heights_of_the_sums(waves: int, nodes: int, rows: in
         assert np.all(np.abs(one - other) <= rounding * full)  # wholly in contact: nothing else differs
         one, other = (found(layer, x, -0.1 * high, *travel) for layer in (window, sums))
         assert np.all(np.abs(one - other)[[0, 4]] <= rounding * full[[0, 4]])
-
-
-def test_the_heights_are_those_of_exact_arithmetic_however_far_the_wheel_has_travelled() -> None:
-    wheel = wheel_of(12, seed=4)
-    nodes = 64
-    y = -3e-5
-    layer, _ = both(build_pad(K, A, surface(), wheel, nodes))
-    spacing = 2 * A / nodes
-    for x, travel in ((0.0, 0.0), (1e-3, 0.37), (-1e-3, -12.3), (2e-4, 1e4 / 3), (2e-4, 1e7 / 3)):
-        force = 0.0
-        for node in range(nodes):
-            xi = Fraction(-A + spacing * (node + 0.5)) + Fraction(x) - Fraction(travel)
-            turns = [float((Fraction(t) + Fraction(low)) * xi % 1) for t, low in zip(*wheel[3:], strict=True)]
-            means = wheel.g * np.sinc(wheel.omega * spacing / (2 * np.pi))
-            gap = float(means @ np.sin(2 * np.pi * np.array(turns) + wheel.phase)) - y
-            force += K * spacing * max(gap, 0.0)
-        assert force > 0.0
-        assert found(layer, x, y, travel)[0] == pytest.approx(force, rel=0, abs=2e-13 * 2 * A * K * 1e-4)
 
 
 def test_the_error_of_interpolation_is_bounded_and_the_bound_is_sharp() -> None:

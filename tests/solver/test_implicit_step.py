@@ -177,14 +177,14 @@ def test_both_iterations_agree_where_both_converge(evaluator: str, steps: int) -
     assert compared > 50
 
 
-@pytest.mark.parametrize("seed", [32, 33, 34])
-def test_newton_solves_every_step_from_any_guess(seed: int) -> None:
+@pytest.mark.parametrize("many", counts(300, 1000))
+def test_newton_solves_every_step_from_any_guess(many: int) -> None:
     """A solution always exists: F_y >= 0 at F = 0, and as F grows either the shoe slips and is lifted off, or it
     sticks (phi a22 > |a12|) and is lifted off. The residual at the answer is rounding.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(32)
     touching = 0
-    for _, step in random_steps(seed, 700, (-4.0, 4.0), coupling=0.95):
+    for _, step in random_steps(32, many, (-4.0, 4.0), coupling=0.95):
         guess = 0.0 if rng.random() < 0.2 else 2 * A * step.k * step.crest * 10 ** rng.uniform(-3, 1)
         step.given.normal_force = guess
         outcome, evaluations, _ = step.run()
@@ -195,27 +195,7 @@ def test_newton_solves_every_step_from_any_guess(seed: int) -> None:
         assert abs(residual) <= step.tolerance()
         assert abs(step.problem.residual) <= step.tolerance()
         touching += step.force > 0.0
-    assert touching > 300
-
-
-@pytest.mark.parametrize(("off", "mean", "most"), [(1e-3, 2.7, 5), (0.25, 4.5, 12)])
-def test_newton_takes_few_evaluations_from_a_force_nearby(off: float, mean: float, most: int) -> None:
-    """As from the force of the step before. Above all it must not fall back to halving while it converges from one
-    side, which leaves the other side of the bracket where it was (22 to 28 evaluations then).
-    """
-    rng = np.random.default_rng(35)
-    taken = []
-    for _, step in random_steps(35, 600, (-3.0, 3.7), coupling=0.1):
-        assert step.run()[0] == SOLVED
-        if step.force == 0.0:
-            continue
-        step.given.normal_force = step.force * (1.0 + off * rng.uniform(-1, 1))
-        outcome, evaluations, _ = step.run()
-        assert outcome == SOLVED
-        taken.append(evaluations)
-    assert len(taken) > 200
-    assert np.mean(taken) < mean  # measured 2.6 and 4.0
-    assert np.percentile(taken, 99) <= most  # measured 4 and 10
+    assert touching > 0.4 * many
 
 
 @pytest.mark.parametrize(
@@ -263,8 +243,7 @@ def test_every_step_of_a_run_meets_the_tolerance_with_one_evaluation_in_most(sch
     assert run.counts.evaluations - samples < 1.3 * 700  # one to check a guess, and one more: 2 without a proof
 
 
-@pytest.mark.parametrize("ratio", [2.0, 10.0, 300.0, 5000.0])
-@pytest.mark.parametrize("phi", [0.0, 0.3, 5.0])
+@pytest.mark.parametrize(("ratio", "phi"), [(2.0, 0.3), (10.0, 5.0), (300.0, 0.0), (5000.0, 5.0)])
 def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float) -> None:
     """A flat pad under a given approach: F = 2ak (depth - gain F/a22)+ with e's own part known, so that
     F = 2ak depth/(1 + ratio). The paper's iteration multiplies an error by -ratio and jumps between two forces.
@@ -284,7 +263,7 @@ def test_newton_converges_where_the_fixed_point_cannot(ratio: float, phi: float)
     assert abs(step.problem.residual) > 0.1 * step.force  # and the residual tells how far off
 
 
-@pytest.mark.parametrize("steps", counts(100, 500))  # interpreted, of hundreds of evaluations each
+@pytest.mark.parametrize("steps", counts(20, 100))  # interpreted, of hundreds of evaluations each
 def test_a_fixed_point_that_fails_is_never_taken_for_solved(steps: int) -> None:
     outcomes = []
     for _, step in random_steps(36, steps, (-1.0, 4.0)):
@@ -301,7 +280,7 @@ def test_a_fixed_point_that_fails_is_never_taken_for_solved(steps: int) -> None:
 
 
 @pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
-@pytest.mark.parametrize("guess", [0.0, 1e-300, 1.0, 1e9])
+@pytest.mark.parametrize("guess", [0.0, 1e9])
 def test_an_open_contact_carries_nothing(evaluator: str, guess: float) -> None:
     wheel = surface([1e-5], wavelengths=[0.02])
     step = Step(
@@ -311,45 +290,6 @@ def test_an_open_contact_carries_nothing(evaluator: str, guess: float) -> None:
     assert (outcome, rising, step.force, step.contact.normal_force) == (SOLVED, 0, 0.0, 0.0)
     assert evaluations <= 60
     assert step.problem.d == 3.0 / 1e6
-
-
-@pytest.mark.parametrize("evaluator", ["closed-form", "midpoint", "exact", "auto"])
-@pytest.mark.parametrize("solve", [newton, fixed_point])
-def test_a_shoe_that_just_touches_is_solved(evaluator: str, solve: Any) -> None:
-    """y at the edge of contact, and some units in the last place on either side of it."""
-    for ulps in range(-3, 4):
-        y = -1e-5 + ulps * math.ulp(1e-5)
-        step = Step(k=1e8, evaluator=evaluator, a_11=1e6, a_22=1e6, gain=0.05, y_0=y, g_2=1e-5 / 0.05 * 1e6)
-        outcome, _, _ = step.run(solve)
-        assert outcome == SOLVED
-        # The edge lies at e = 2e-4, whose rounding the contact turns into force.
-        assert 0.0 <= step.force <= 2 * A * 1e8 * 8 * math.ulp(1e-5)
-
-
-@pytest.mark.parametrize("steps", counts(100, 300))
-def test_a_stuck_shoe_moves_with_the_wheel_exactly(steps: int) -> None:
-    stuck = 0
-    for _, step in random_steps(37, steps, (-2.0, 3.0)):
-        for solve, most in ((newton, 100), (fixed_point, 500)):
-            if step.run(solve, most)[0] == SOLVED and step.problem.side == 0.0:
-                stuck += 1
-                assert step.problem.d == step.given.belt
-    assert stuck > 0.1 * steps
-
-
-def test_an_explicit_scheme_evaluates_the_contact_once() -> None:
-    checked = 0
-    for _, step in random_steps(38, 50, (-2.0, 3.0)):
-        step.given.gain = 0.0
-        step.given.normal_force = 123.0
-        assert step.run() == (SOLVED, 1, 0)
-        by_newton = [step.problem[name] for name in ("d", "e", "normal_force", "side")]
-        assert step.force == step.contact.normal_force == pytest.approx(step.force_at(0.0), rel=1e-12, abs=0)
-        assert step.run(fixed_point, 500)[0] == SOLVED
-        again = [step.problem[name] for name in ("d", "e", "normal_force", "side")]
-        assert again == pytest.approx(by_newton, rel=1e-12, abs=0)  # exact contact follows what it found before
-        checked += 1
-    assert checked == 50
 
 
 # --- a wedge: the friction force presses the shoe on -----------------------------------------------------------
@@ -374,7 +314,7 @@ def wedge(guess: float, y_0: float) -> Step:
     )
 
 
-@pytest.mark.parametrize("guess", [0.0, 0.1, 1.0, 5.0, 9.0, 9.2, 100.0, 1e9])
+@pytest.mark.parametrize("guess", [0.0, 9.0, 9.2, 1e9])
 def test_a_wedge_is_told_and_does_not_hang(guess: float) -> None:
     step = wedge(guess, y_0=-1.5e-4)  # touching at F = 0 already: only stick holds
     p = step.given
@@ -387,26 +327,6 @@ def test_a_wedge_is_told_and_does_not_hang(guess: float) -> None:
     assert step.force == pytest.approx(1e7 * 1.5e-4 / (1 + 1e7 * 3e-6), rel=1e-12)
     if guess < 9.0909:
         assert rising > 0
-
-
-def test_a_wedge_has_three_solutions_of_which_one_is_found() -> None:
-    """Just above the wheel the shoe may fly past, F = 0, or catch on it: r has three roots on F >= 0."""
-    step = wedge(0.0, y_0=-1.2e-4)
-    forces = np.linspace(0.0, 100.0, 10001)
-    residuals = np.array([step.force_at(f) - f for f in forces])
-    roots = 1 + int(np.count_nonzero(np.diff(residuals[1:] > 0)))  # F = 0 is one of them
-    assert (residuals[0], roots) == (0.0, 3)
-    found = set()
-    risen = 0
-    for guess in (0.0, 1.0, 1.75, 3.0, 50.0, 1e3, 1e6):
-        step.given.normal_force = guess
-        outcome, _, rising = step.run()
-        assert outcome == SOLVED
-        assert abs(step.force_at(step.force) - step.force) <= step.tolerance()
-        found.add(round(step.force, 6))
-        risen += rising
-    assert found == {0.0, round(1200 / 31, 6)}  # never the unstable one between them
-    assert risen > 0
 
 
 def test_the_reported_slope_is_the_residual_s_derivative() -> None:

@@ -209,12 +209,14 @@ print(there, numba.njit(lambda a: numpy.dot(a, a))(numpy.ones(3)) if there else 
     assert python(program, cache) == f"{found}\n"
 
 
+@campaign
 def test_kernels_compile_where_no_cache_can_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
     out = python(COUNT.format(limit=""), tmp_path / "file")
     assert out.splitlines() == [FOUND, "True"]
 
 
+@campaign
 def test_a_temporary_cache_goes_with_its_process_or_where_that_was_killed_with_a_later_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -263,21 +265,6 @@ def test_a_damaged_entry_is_not_loaded(tmp_path: Path, ending: str, change: Call
     assert path.read_bytes() == whole != changed
 
 
-@pytest.mark.parametrize("changes", [{"BRAKECLI_COMPILE": "lazy"}, {}])
-@campaign
-@pytest.mark.usefixtures("compiled")
-def test_a_damaged_entry_is_not_loaded_where_all_cannot_be_made_anew(
-    tmp_path: Path, changes: dict[str, str]
-) -> None:
-    _, folder = copied(tmp_path)
-    (path,) = folder.joinpath("roughness.turn_to").rglob("*.nbc")
-    path.write_bytes(noise(path.read_bytes()))
-    program = "from brakecli.solver import beforehand\nbeforehand._hindrance = lambda folder: 'none'\n"
-    program += COUNT.format(limit="")
-    found = [printed(program, XDG_CACHE_HOME=str(tmp_path), **changes).splitlines() for _ in range(2)]
-    assert found == [[FOUND, "True"], [FOUND, "False"]]
-
-
 @campaign
 @pytest.mark.usefixtures("compiled")
 def test_a_folder_inside_that_cannot_be_written_sends_no_machine_code_elsewhere(tmp_path: Path) -> None:
@@ -287,18 +274,6 @@ def test_a_folder_inside_that_cannot_be_written_sends_no_machine_code_elsewhere(
     found = printed(refused + COUNT.format(limit=""), XDG_CACHE_HOME=str(tmp_path))
     assert found.splitlines() == [FOUND, "True"]
     assert not [*Path(kernels.__file__).parent.rglob("*.nb?")]
-
-
-@campaign
-@pytest.mark.usefixtures("compiled")
-def test_without_docstrings_there_is_a_cache_of_its_own(tmp_path: Path) -> None:
-    _, folder = copied(tmp_path)
-    before = {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()}
-    words = [sys.executable, "-OO", "-c", COUNT.format(limit="")]
-    changes = environment(XDG_CACHE_HOME=str(tmp_path), BRAKECLI_COMPILE="lazy")
-    done = subprocess.run(words, env=changes, capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines() == [FOUND, "True"]
-    assert {path: path.stat().st_mtime_ns for path in folder.rglob("*") if path.is_file()} == before
 
 
 FORK = """

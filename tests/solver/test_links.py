@@ -48,21 +48,6 @@ def rotated(u: tuple[float, float], degrees: float) -> NDArray[np.float64]:
     return np.array([cosine * u[0] - sine * u[1], sine * u[0] + cosine * u[1]])
 
 
-@pytest.mark.parametrize("beta", [0.0, -0.0, 90.0, -90.0])
-@pytest.mark.parametrize("alpha", [0.0, -0.0, 90.0, -90.0])
-def test_upright_and_level_links_decouple_exactly(beta: float, alpha: float) -> None:
-    c = links(1e7, 300.0, beta, 2e7, 500.0, alpha)
-    assert (c.c_xy, c.b_xy) == (0.0, 0.0)
-    # which link acts along x
-    level_1 = abs(beta) == 90
-    level_2 = abs(alpha) == 0
-    assert c.c_xx == 1e7 * level_1 + 2e7 * level_2
-    assert c.c_yy == 1e7 * (not level_1) + 2e7 * (not level_2)
-    assert c.b_xx == 300 * level_1 + 500 * level_2
-    assert c.b_yy == 300 * (not level_1) + 500 * (not level_2)
-    assert (c.sin_beta, c.cos_beta) == ((math.copysign(1, beta), 0.0) if level_1 else (0.0, 1.0))
-
-
 @given(angle)
 def test_the_load_acts_along_link_one(beta: float) -> None:
     """The reaction of link 1 and the load share one direction: (sin beta, cos beta)."""

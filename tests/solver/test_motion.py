@@ -87,17 +87,6 @@ def test_a_wheel_that_turns_the_other_way_gives_the_mirror_image(
     assert np.mean(backwards.state[slip] == -forwards.state[slip]) > 0.999
 
 
-@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
-def test_both_iterations_give_the_same_history(scheme: str, theta: tuple[float, ...]) -> None:
-    changes: dict[str, Any] = {"solver__scheme": scheme, "solver__theta": theta, "wheel__angular_speed": 0.2}
-    newton = simulate(make(ROUGH, **changes))
-    paper = simulate(make(ROUGH, solver__iteration="fixed-point", **changes))
-    scale = np.abs(newton.rows).max(axis=0)
-    # Each step is solved to 1e-13 of its force; 2000 steps of a motion that does not amplify keep within 1e-9.
-    assert np.all(np.abs(newton.rows - paper.rows).max(axis=0)[:6] <= 1e-9 * scale[:6])
-    assert paper.work.contact_evaluations > newton.work.contact_evaluations
-
-
 def test_a_run_that_the_fixed_point_cannot_solve_says_so() -> None:
     case = make(SQUEAL, contact__stiffness=1e14, solver__iteration="fixed-point")
     limits = step_limits(system_of(case))
@@ -109,25 +98,7 @@ def test_a_run_that_the_fixed_point_cannot_solve_says_so() -> None:
     assert simulate(make(SQUEAL, contact__stiffness=1e14)).work.failure is Failure.NONE
 
 
-@pytest.mark.parametrize("number", [2.0, 50.0, 5000.0])
-@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
-def test_newton_solves_contacts_far_too_stiff_for_the_fixed_point(
-    scheme: str, theta: tuple[float, ...], number: float
-) -> None:
-    weight = 0.25 if scheme == "two-layer" else 0.5  # θ1 θ2, or 2 θ1 · ½
-    stiffness = number * 10.0 / (weight * 1e-10) / 0.1
-    case = make(SQUEAL, solver__scheme=scheme, solver__theta=theta, contact__stiffness=stiffness)
-    result = simulate(case)
-    assert result.work.unconverged_steps == 0
-    assert result.work.most_evaluations <= 8
-    # Every step is solved; that a step is too long for the bounces shows in the account, and is named.
-    closes = abs(result.energy.relative_closing_error) < 0.1
-    assert result.work.failure is (Failure.NONE if closes else Failure.UNBALANCED)
-    assert closes or scheme == "three-layer"
-
-
-@pytest.mark.parametrize("stiffness", [1.0, 1e4, 1e8, 1e12, 1e16])
-@pytest.mark.parametrize("phi", [0.0, 0.5, 5.0])
+@pytest.mark.parametrize(("stiffness", "phi"), [(1.0, 0.5), (1e8, 5.0), (1e12, 0.0), (1e16, 0.5), (1e16, 5.0)])
 @pytest.mark.parametrize("base", [SQUEAL, ROUGH])
 def test_any_stiffness_and_friction_end_in_a_solution_or_a_named_failure(
     base: dict[str, Any], phi: float, stiffness: float
@@ -142,26 +113,6 @@ def test_any_stiffness_and_friction_end_in_a_solution_or_a_named_failure(
         assert len(result.rows) == 51
     else:
         assert result.work.failure is Failure.UNBALANCED
-
-
-@pytest.mark.parametrize("alpha", [-90.0, 0.0, 90.0])
-@pytest.mark.parametrize("beta", [-90.0, 0.0, 90.0])
-def test_links_at_right_angles_do_not_couple_the_directions(alpha: float, beta: float) -> None:
-    case = make(SQUEAL, link1__angle_deg=beta, link2__angle_deg=alpha, friction__coefficient=0.0)
-    result = simulate(case)
-    assert system_of(case).coefficients.c_xy == 0.0
-    assert np.all(np.isfinite(result.rows))
-    if beta == 0.0:  # the load acts along y alone
-        assert np.all(result.x == 0.0)
-    else:
-        assert np.all(result.y == 0.0)
-
-
-@pytest.mark.parametrize("speed", [0.0, 1e-9, -1.0, 2e3])
-def test_any_speed_of_the_wheel_is_computed(speed: float) -> None:
-    result = simulate(make(ROUGH, wheel__angular_speed=speed, solver__duration=0.005))
-    assert result.work.failure is Failure.NONE
-    assert np.all(np.isfinite(result.rows))
 
 
 @pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
@@ -194,20 +145,6 @@ def test_three_layer_scheme_tells_stick_by_its_cycles_not_by_its_flicker(step: f
     assert fractions[1] == pytest.approx(fractions[0], abs=step * 174.0 + 0.002)
 
 
-@pytest.mark.parametrize(("scheme", "theta"), SCHEMES)
-def test_friction_force_does_not_zigzag_in_stick(scheme: str, theta: tuple[float, ...]) -> None:
-    result = simulate(
-        make(SQUEAL, solver__scheme=scheme, solver__theta=theta, friction__coefficient=0.7,
-             output__sample_interval=1e-5, solver__duration=0.2)
-    )  # fmt: skip
-    stick = (result.state == 0) & (result.time > 0.1)
-    inside = stick[2:] & stick[1:-1] & stick[:-2]
-    second = np.abs(np.diff(result.friction_force, 2))[inside]
-    assert second.size > 100
-    # A smooth force changes its slope by ω²h²F a step: (1100 · 1e-5)² of 600 N is 0.07 N.
-    assert second.max() < 0.2
-
-
 def test_load_and_speed_schedules_act_at_their_times() -> None:
     # A free mass without links: the load decides ÿ, and the open contact nothing.
     case = make(
@@ -226,21 +163,6 @@ def test_load_and_speed_schedules_act_at_their_times() -> None:
         t < 1.0, 0.0, np.where(t < 2.0, (t - 1.0) ** 3 / 6.0, 1 / 6 + (t - 2.0) / 2 + (t - 2) ** 2 / 2)
     )
     assert np.abs(result.y - exact).max() < 0.01**2 * 2.0  # the trapezoidal rule's h²/12 ∫|Q''| and its knots
-
-
-def test_an_unstable_scheme_is_known_by_its_amplification() -> None:
-    for step, stable in ((1.9, True), (2.1, False)):  # explicit three-layer: ωh < 2, with ω² = 3 at most here
-        case = make(
-            MODE_COUPLING, solver__scheme="three-layer", solver__theta=(0.0, 1.0, 0.0), friction__coefficient=0.0,
-            solver__step=step / np.sqrt(3.0),
-        )  # fmt: skip
-        assert (step_limits(system_of(case)).growth < 1.0 + 1e-9) == stable
-    for step, stable in ((2.4, True), (2.5, False)):  # weights of Numerov: ωh < √6
-        case = make(
-            MODE_COUPLING, solver__scheme="three-layer", solver__theta=(1 / 12, 10 / 12, 1 / 12),
-            friction__coefficient=0.0, solver__step=step / np.sqrt(3.0),
-        )  # fmt: skip
-        assert (step_limits(system_of(case)).growth < 1.0 + 1e-9) == stable
 
 
 def test_motion_that_blows_up_is_named() -> None:
@@ -269,24 +191,3 @@ def test_a_run_keeps_no_more_than_a_block_in_memory() -> None:
     solve(system, sink=lambda rows: sizes.append(len(rows)))
     assert sum(sizes) == 10**6 + 1
     assert max(sizes) <= simulation.BLOCK_ROWS
-
-
-def test_a_shoe_that_sticks_to_a_slowing_wheel_sticks_at_every_sample() -> None:
-    # A free shoe on a slowing wheel: only friction holds it, and it holds. U at a sample and U in the step
-    # before it are rounded apart.
-    case = make(
-        {
-            **COULOMB,
-            "link1": {"stiffness": 0.0},
-            "link2": {"stiffness": 0.0},
-            "wheel": {"radius": 0.3, "times": [0.0, 7.3], "angular_speeds": [1.7, 0.1]},
-            "initial": {"y": -1.1, "vx": 1.7 * 0.3},
-            "solver": {"step": 0.003, "duration": 6.0},
-            "output": {"sample_interval": 0.021},
-        }
-    )
-    result = simulate(case)
-    assert np.all(result.state == 0)
-    slope = 0.3 * (0.1 - 1.7) / 7.3
-    assert result.friction_force == pytest.approx(slope, rel=1e-12)  # m dU/dt, with m = 1 kg
-    assert np.abs(result.vx - (0.51 + slope * result.time)).max() < 1e-14

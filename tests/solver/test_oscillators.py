@@ -2,9 +2,7 @@
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
-from brakecli.case.system import system_of
 from tests.examples import COULOMB, MODE_COUPLING, SQUEAL, make, simulate
 
 COULOMB_REST = 15.0 - np.sqrt(205.0)  # 0.6821789367236466
@@ -34,14 +32,6 @@ def test_coulomb_rest_converges_with_the_square_of_the_step_on_the_whole() -> No
     assert slope == pytest.approx(2.0, abs=0.3)  # event times jitter on the grid
 
 
-def test_a_sticking_shoe_stays_at_rest_exactly() -> None:
-    result = simulate(make(COULOMB))
-    stuck = result.state == 0
-    assert stuck[-1000:].all()
-    assert np.ptp(result.x[-1000:]) == 0.0
-    assert np.all(result.vx[stuck] == 0.0)
-
-
 @pytest.mark.parametrize(("scheme", "theta"), [("two-layer", [0.5, 0.5]), ("three-layer", [0.25, 0.5, 0.25])])
 def test_mode_coupling_grows_at_the_published_rate_and_frequency(scheme: str, theta: list[float]) -> None:
     case = make(
@@ -58,43 +48,6 @@ def test_mode_coupling_grows_at_the_published_rate_and_frequency(scheme: str, th
     fastest = exponents[np.argmax(exponents.real)]
     assert fastest.real == pytest.approx(0.2020717687680948, abs=1e-4)
     assert abs(fastest.imag) == pytest.approx(1.4285772641803685, abs=1e-4)
-
-
-@pytest.mark.parametrize(("phi", "grows"), [(0.74, False), (0.76, True)])
-def test_mode_coupling_grows_only_above_its_critical_friction(phi: float, grows: bool) -> None:
-    result = simulate(make(MODE_COUPLING, friction__coefficient=phi, solver__duration=150.0))
-    motion = np.abs(result.vx)
-    early = motion[:6000].max()
-    late = motion[-6000:].max()
-    assert (late > 10.0 * early) == grows
-    assert late < 1.01 * early or grows
-
-
-def test_without_friction_the_motion_is_the_matrix_exponential() -> None:
-    case = make(
-        SQUEAL,
-        friction__coefficient=0.0,
-        initial__at="equilibrium",
-        initial__x=2e-5,
-        initial__vy=0.01,
-        solver__step=1e-6,
-    )
-    system = system_of(case)
-    result = simulate(case)
-    c = system.coefficients
-    k = system.contact_stiffness
-    a = np.zeros((4, 4))
-    a[:2, 2:] = np.eye(2)
-    a[2:] = -np.array([[c.c_xx, c.c_xy, c.b_xx, c.b_xy], [c.c_xy, c.c_yy + k, c.b_xy, c.b_yy]]) / c.m
-    rest = np.linalg.solve([[c.c_xx, c.c_xy], [c.c_xy, c.c_yy + k]], [0.0, -5000.0])
-    step = expm(a * 1e-4)
-    exact = [result.rows[0, :4] - [*rest, 0.0, 0.0]]
-    for _ in result.time[1:]:
-        exact.append(step @ exact[-1])
-    motion = result.rows[:, :4] - [*rest, 0.0, 0.0]
-    # The scheme turns each mode by ωh - (ωh)³/12 a step: after 0.1 s its phase is off by ω³h²t/12 = 1.2e-5.
-    scale = np.abs(np.array(exact)).max(axis=0)
-    assert np.all(np.abs(motion - exact).max(axis=0) < 3e-5 * scale)
 
 
 def belt(damping: float) -> dict[str, object]:
@@ -118,9 +71,3 @@ def test_an_undamped_mass_on_a_belt_sticks_then_circles_at_the_belt_speed() -> N
     # Samples every 0.11 of a radian miss the top by (0.055)²/2; the circle itself keeps U but for (ωh)².
     assert late.max() == pytest.approx(0.05, rel=0.0555**2 / 2 + omega_h**2)
     assert result.vx.max() == 0.05
-
-
-def test_any_dashpot_makes_the_mass_on_a_belt_decay() -> None:
-    result = simulate(make(SQUEAL, **belt(300.0)))
-    decay = np.exp(-300.0 / 20.0 * 0.9)  # exp(-b t / 2m) from the end of stick on, before 0.002 s
-    assert np.abs(result.vx[-1000:]).max() < 0.05 * decay * 1.05

@@ -6,22 +6,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, Stepping, solve
 from brakecli.solver.method import Method
-from brakecli.solver.quantities import ContactState, Failure
-from brakecli.solver.schedules import SLOPE, VALUE
+from brakecli.solver.quantities import Failure
 from tests.campaign import counts
 from tests.examples import COULOMB, SQUEAL, make
-from tests.solver.piecewise_exact import PiecewiseExact
-from tests.solver.test_event_driven import error, flat_case, mirrored
+from tests.solver.test_event_driven import error, flat_case
 
 EXACT = Method("piecewise-exact")
-SUITE = 8
-CAMPAIGN = 200
 
 
 def motion(case: Case | dict[str, Any], method: Method = EXACT) -> Motion:
@@ -58,39 +53,6 @@ def same_as_event_driven(case: Case | dict[str, Any], bound: float) -> Motion:
 
 # --- one phase -----------------------------------------------------------------------------------------------
 
-RAMPS: dict[str, Any] = {"wheel__times": [0.0, 1.0], "load__times": [0.0, 1.0]}
-PHASES: dict[float, dict[str, Any]] = {  # the state, and what keeps a shoe in it
-    -1.0: {"wheel__angular_speeds": [2.0, 9.0], "load__forces": [5e3, 2e5]},
-    0.0: {"wheel__angular_speeds": [0.1, 0.3], "load__forces": [5e3, 9e3], "friction__coefficient": 50.0},
-    1.0: {"wheel__angular_speeds": [-2.0, -9.0], "load__forces": [5e3, 2e5]},
-    2.0: {"wheel__angular_speeds": [0.1, 0.3], "load__forces": [-5e3, -9e4], "initial__y": 1e-3},
-}
-
-
-@pytest.mark.parametrize("state", PHASES)
-def test_a_phase_is_a_matrix_exponential(state: float) -> None:
-    changes = {"wheel__angular_speed": None, "load__force": None, "solver__duration": 0.02, **RAMPS}
-    changes |= {"initial__vx": 0.05, "initial__y": -4e-4} if state == 0.0 else {"initial__y": -1e-4}
-    case = tabled(SQUEAL, **{**changes, **PHASES[state]})
-    found = motion(case)
-    system = system_of(case)
-    assert set(found.rows[:, 7]) == {state}
-    c = system.coefficients
-    k = system.contact_stiffness if state != 2.0 else 0.0
-    belt = system.belt
-    load = system.load
-    a = np.zeros((8, 8))  # of x, y, vx, vy, U, U', Q, Q'
-    a[0, 2] = a[1, 3] = a[4, 5] = a[6, 7] = 1.0
-    a[3] = np.array([-c.c_xy, -c.c_yy - k, -c.b_xy, -c.b_yy, 0, 0, -c.cos_beta, 0]) / c.m
-    a[2] = np.array([-c.c_xx, -c.c_xy, -c.b_xx, -c.b_xy, 0, 0, -c.sin_beta, 0]) / c.m
-    if state in (-1.0, 1.0):
-        a[2, 1] += state * c.phi * k / c.m  # F_x = -side φ F_y, F_y = -k y
-    if state == 0.0:
-        a[2] = [0, 0, 0, 0, 0, 1, 0, 0]
-    start = np.array([*found.rows[0, :4], belt[VALUE], belt[SLOPE], load[VALUE], load[SLOPE]])
-    exact = np.array([(expm(a * t) @ start)[:4] for t in 1e-4 * np.arange(len(found.rows))])
-    assert error(found.rows, exact) < 1e-12
-
 
 # --- random shoes --------------------------------------------------------------------------------------------
 
@@ -122,7 +84,7 @@ def drawn(rng: np.random.Generator, kind: int) -> dict[str, Any]:
     return case
 
 
-@pytest.mark.parametrize("many", counts(SUITE, CAMPAIGN))
+@pytest.mark.parametrize("many", counts(8, 60))
 def test_random_shoes_move_as_by_the_event_driven_scheme(many: int) -> None:
     """Rounding errors of some 1e-15 a step, of two solutions, in motions that amplify them by up to 1e4."""
     rng = np.random.default_rng(31)
@@ -130,18 +92,6 @@ def test_random_shoes_move_as_by_the_event_driven_scheme(many: int) -> None:
     for number in range(many):
         seen |= set(same_as_event_driven(drawn(rng, number % 5), 1e-10).rows[:, 7])
     assert seen == {-1.0, 0.0, 1.0, 2.0}
-
-
-@pytest.mark.parametrize("many", counts(4, 100))
-def test_random_shoes_move_as_matrix_exponentials_say(many: int) -> None:
-    rng = np.random.default_rng(32)
-    for _ in range(many):
-        case, omega = flat_case(rng, 1e-12)
-        found = motion(case)
-        reference = PiecewiseExact(system_of(Case.model_validate(case)), 0.05 / omega)
-        start = found.rows[0, :4]
-        exact = reference.run(start, *reference.first_phase(start), samples=len(found.rows) - 1, per_sample=2)
-        assert error(found.rows, exact) < 1e-10
 
 
 # --- hard cases ----------------------------------------------------------------------------------------------
@@ -210,20 +160,7 @@ def test_a_shoe_that_rests_on_the_wheel_and_is_pulled_off_leaves_it_at_once() ->
     np.testing.assert_allclose(motion(case).rows[-1, :4], motion(later).rows[-1, :4], rtol=1e-9)
 
 
-def test_relaxation_is_that_of_the_event_driven_scheme() -> None:
-    found = same_as_event_driven(tabled(SQUEAL, friction__coefficient=0.7, solver__duration=0.2), 1e-11)
-    assert {-1.0, 0.0} <= set(found.rows[:, 7])
-
-
-def test_coulomb_oscillator_comes_to_its_exact_rest() -> None:
-    rows = motion(tabled(COULOMB)).rows
-    # 6000 steps, each with a rounding of up to 13 m
-    assert rows[-1, 0] == pytest.approx(0.6821789367236466, abs=6000 * np.spacing(13.0))
-    assert rows[-1, 7] == ContactState.STICK
-    assert rows[-1, 2] == 0.0
-
-
-@pytest.mark.parametrize("gap", [1e-2, 1e-4, 1e-6, 1e-8, -1e-8, -1e-6, -1e-4, -1e-2])
+@pytest.mark.parametrize("gap", [1e-2, 1e-8, -1e-8, -1e-2])
 def test_a_touch_within_a_step_is_not_passed_over(gap: float) -> None:
     """The shoe swings freely about its rest, and its velocity just reaches the wheel's, or just does not.
 
@@ -239,40 +176,6 @@ def test_a_touch_within_a_step_is_not_passed_over(gap: float) -> None:
     other = motion(case, Method("event-driven", tolerance=1e-12))
     np.testing.assert_allclose(found.rows[:, [0, 2]], other.rows[:, [0, 2]], rtol=0.0, atol=1e-10)
     assert found.work.steps > system_of(case).samples if gap > 0.0 else found.work.steps == system_of(case).samples
-
-
-def test_a_stuck_shoe_moves_with_the_wheel_to_rounding() -> None:
-    speeds = {"angular_speed": None, "times": [0.0, 0.001], "angular_speeds": [0.1, 0.3]}
-    start = {"friction__coefficient": 5.0, "initial__y": -4e-4, "initial__vx": 0.05, "initial__x": -1e-4}
-    wheel = {f"wheel__{key}": value for key, value in speeds.items()}
-    rows = motion(tabled(SQUEAL, solver__duration=0.002, **start, **wheel)).rows
-    assert set(rows[:, 7]) == {ContactState.STICK}
-    t = 1e-4 * np.arange(len(rows))
-    travel = np.where(t < 0.001, 0.05 * t + 50.0 * t**2, 1e-4 + 0.15 * (t - 0.001))
-    assert np.abs(rows[:, 0] - (travel - 1e-4)).max() < 1e-18
-    np.testing.assert_allclose(rows[:, 2], np.where(t < 0.001, 0.05 + 100.0 * t, 0.15), rtol=4e-16)
-
-
-def test_a_shoe_without_springs_flies_and_lands() -> None:
-    # Thrown up with 3 m/s against a load of 2 N: y = 3 t - t² for 3 s. Then the contact alone, with ω² = 10, turns
-    # it about y = -0.2: y = -0.2 + 0.2 cos ωτ - 3/ω sin ωτ.
-    none = {"link1__stiffness": 0.0, "link2__stiffness": 0.0, "initial": {"vy": 3.0}}
-    base = {**COULOMB, "initial": none.pop("initial"), "load": {"force": 2.0}}
-    rows = motion(tabled(base, solver__duration=4.0, output__sample_interval=0.01, **none)).rows
-    t = 0.01 * np.arange(len(rows))
-    omega = math.sqrt(10.0)
-    landed = -0.2 + 0.2 * np.cos(omega * (t - 3.0)) - 3.0 / omega * np.sin(omega * (t - 3.0))
-    np.testing.assert_allclose(rows[:, 1], np.where(t < 3.0, 3.0 * t - t * t, landed), atol=1e-13 * 2.25)
-    assert set(rows[:, 7]) == {ContactState.SEPARATED, ContactState.STICK}  # x rests on a wheel at rest
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_the_mirror_image_of_a_motion_is_a_motion(seed: int) -> None:
-    case, _ = flat_case(np.random.default_rng(seed), 1e-10)
-    one = motion(case).rows
-    other = motion(mirrored(case)).rows
-    np.testing.assert_array_equal(other[:, [1, 3, 5, 6]], one[:, [1, 3, 5, 6]])
-    np.testing.assert_array_equal(other[:, [0, 2, 4]], -one[:, [0, 2, 4]])
 
 
 def test_a_run_may_be_cut_into_blocks_anywhere() -> None:
@@ -355,7 +258,7 @@ def test_a_phase_within_a_step_whose_margin_rises_at_both_ends_is_found(what: st
     assert float((np.abs(found.rows[:, :4] - other.rows[:, :4]).max(axis=0) / scale).max()) < 1e-8
 
 
-@pytest.mark.parametrize("lack", [0.0, *10.0 ** -np.arange(5.0, 17.0)])
+@pytest.mark.parametrize("lack", [0.0, 1e-5, 1e-11, 1e-16])
 @pytest.mark.parametrize("speed", [1.0, 0.1])
 def test_a_shoe_that_all_but_sticks_is_carried_along(lack: float, speed: float) -> None:
     """ẍ + x = λ, |λ| ≤ 1, with the wheel's velocity U from x = -1 - ε on, where friction lacks ε.
@@ -377,7 +280,7 @@ def test_a_shoe_that_all_but_sticks_is_carried_along(lack: float, speed: float) 
     np.testing.assert_allclose(motion.rows[1:, 2], speed, rtol=1e-14)
 
 
-@pytest.mark.parametrize("lack", 10.0 ** -np.arange(9.0, 16.0))
+@pytest.mark.parametrize("lack", [1e-9, 1e-12, 1e-15])
 def test_a_shoe_that_comes_to_all_but_stick_by_slip_goes_on(lack: float) -> None:
     """(x - 1)² + ẋ² = 1 + (2 + ε)²: pushed by friction it has the wheel's velocity, 1 m/s, at x = -1 - ε."""
     case = make(

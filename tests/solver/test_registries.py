@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.campaign import campaign
 from tests.commands import TINY, environment
 
 ROOT = Path(__file__).parents[2]
@@ -104,6 +105,7 @@ def history(folder: Path, name: str) -> Any:
         return np.array([file[f"history/{each}"][:] for each in names])
 
 
+@campaign
 def test_a_small_scheme_and_a_small_evaluator_go_through_check_run_and_compare_schemes(copy: Path) -> None:
     checked = answer(copy, "check", "own.toml")
     assert checked["evaluator"] == "spring"
@@ -116,6 +118,7 @@ def test_a_small_scheme_and_a_small_evaluator_go_through_check_run_and_compare_s
     assert entries[1]["observed_order"] == pytest.approx(1.0, abs=0.15)
 
 
+@campaign
 def test_the_small_ones_agree_with_those_of_the_solver(copy: Path) -> None:
     """The two-layer scheme with weights of one is backward Euler."""
     own, same = (history(copy, name) for name in ("own", "same"))

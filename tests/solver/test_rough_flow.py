@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
@@ -76,7 +75,7 @@ def event_driven(system: System, state: Array, span: float, samples: int, tolera
 # --- derivative -----------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("many", counts(80, 1300))
+@pytest.mark.parametrize("many", counts(80, 400))
 def test_the_derivative_is_that_of_differences(many: int) -> None:
     """Where both sides have the same word, with a difference of 1e-6 of the sizes.
 
@@ -212,7 +211,7 @@ def order(errors: Array, finer: float) -> float:
     return float(np.log(errors[:, 0] / errors[:, 1]).mean() / math.log(finer))
 
 
-@pytest.mark.parametrize("many", counts(12, 120))
+@pytest.mark.parametrize("many", counts(12, 40))
 def test_the_end_comes_to_that_of_the_event_driven_scheme(many: int) -> None:
     """By order five in full contact, and by about three where the pad opens.
 
@@ -229,31 +228,6 @@ def test_the_end_comes_to_that_of_the_event_driven_scheme(many: int) -> None:
     assert np.quantile(errors[:, [1, 3]], 0.9) < 1e-5
 
 
-@pytest.mark.parametrize("side", [-1.0, 1.0])
-def test_a_smooth_pad_that_touches_is_a_matrix_exponential(side: float) -> None:
-    case = make(SQUEAL, wheel__angular_speed=side * 2.0, solver__step=1e-5)
-    system = system_of(case)
-    c = system.coefficients
-    k = system.contact_stiffness
-    grip = side * system.coefficients.phi
-    stiffness = np.array([[c.c_xx, c.c_xy + grip * k], [c.c_xy, c.c_yy + k]])
-    damping = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
-    matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness / c.m, -damping / c.m]])
-    load = system.load_at_start * np.array([c.sin_beta, c.cos_beta])
-    rest = np.append(np.linalg.solve(stiffness, -load), [0.0, 0.0])
-    size = scales(system)
-    span = 3.0 / system.natural_frequencies[1]
-    change = 0.1 * size * np.array([1.0, -0.5, 0.3, 0.7])
-    found = RoughFlow(system, 2)(rest + change, 0.0, span, 2000)
-    expected = expm(matrix * span)
-    assert found.word == (BACKWARD if side > 0.0 else FORWARD,)
-    np.testing.assert_allclose(found.state / size, (rest + expected @ change) / size, atol=1e-11)
-    assert found.derivative is not None
-    np.testing.assert_allclose(
-        found.derivative * size / size[:, None], expected * size / size[:, None], atol=1e-11
-    )
-
-
 def test_a_common_period_later_everything_is_the_same() -> None:
     for seed in (0, 1, 2, 7, 8, 12):
         system, state, span, _ = rough_shoe(seed)
@@ -268,62 +242,6 @@ def test_a_common_period_later_everything_is_the_same() -> None:
         np.testing.assert_allclose(one.state / size, other.state / size, atol=1e-9)
         assert one.word == other.word
         assert np.abs((one.state - third.state) / size).max() > 1e-6
-
-
-@pytest.mark.parametrize("cells", [40, 96])
-@pytest.mark.parametrize("deeper", [1.2, 0.96])
-def test_the_force_of_a_pad_that_touches_everywhere_is_exact(cells: int, deeper: float) -> None:
-    """2ak (-y + Σ g2 sin(ω2 a) / (ω2 a) sin(ω2 (x - Ut) + phase) - mean of f1), by cells and in closed form."""
-    waves = {"amplitudes": [3e-5, 2e-5], "wavelengths": [0.03, 0.011], "phases_deg": [40.0, -75.0]}
-    shoe = {"amplitudes": [2e-5], "wavelengths": [0.019], "phases_deg": [65.0]}
-    system = system_of(make(ROUGH, roughness__wheel=waves, roughness__shoe=shoe))
-    c = system.coefficients
-    a = system.half_length
-    time = 0.705
-    # the crests make 7e-5 m; a little less is not proved to touch, but it does
-    x = 1e-5
-    y = -deeper * 7e-5
-    found = RoughFlow(system, cells)(np.array([x, y, 0.0, 0.0]), time, 1e-15, 1)
-    assert found.margins.contact == pytest.approx(1.0, abs=1e-15)
-    gap = -y
-    for sign, surface, at in ((1.0, system.wheel, x - system.belt_speed * time), (-1.0, system.shoe, 0.0)):
-        mean = np.sin(surface.omega * a) / (surface.omega * a)
-        gap += sign * float(np.sum(surface.g * mean * np.sin(surface.omega * at + surface.phase)))
-    along = c.phi * system.contact_stiffness * gap
-    across = system.contact_stiffness * gap
-    load = system.load_at_start
-    along -= c.c_xx * x + c.c_xy * y + load * c.sin_beta
-    across -= c.c_xy * x + c.c_yy * y + load * c.cos_beta
-    np.testing.assert_allclose(c.m * found.velocity[2:], [along, across], rtol=1e-9)
-
-
-def test_two_spans_are_one_after_the_other() -> None:
-    system, state, span, _ = rough_shoe(3)
-    flow = RoughFlow(system)
-    whole = flow(state, 0.3, span, 4000)
-    half = flow(state, 0.3, 0.5 * span, 2000)
-    rest = flow(half.state, 0.3 + 0.5 * span, 0.5 * span, 2000)
-    size = scales(system)
-    np.testing.assert_allclose(rest.state / size, whole.state / size, atol=1e-9)
-    assert half.derivative is not None
-    assert rest.derivative is not None
-    assert whole.derivative is not None
-    product = rest.derivative @ half.derivative
-    np.testing.assert_allclose(product * size / size[:, None], whole.derivative * size / size[:, None], atol=1e-6)
-
-
-def test_time_does_not_enter_on_a_smooth_wheel() -> None:
-    shoe = ROUGH["roughness"]["shoe"]
-    system = system_of(make(ROUGH, roughness__wheel=None, wheel__angular_speed=0.05))
-    assert system.shoe.g.size == len(shoe["amplitudes"])
-    size = scales(system)
-    span = 4.0 / system.natural_frequencies[1]
-    state = size * np.array([-0.1, -1.0, 0.5, -0.4])
-    flow = RoughFlow(system, 400)
-    end = event_driven(system, state, span, 1).rows[-1, :4]
-    one, other = (flow(state, begin, span, 800) for begin in (0.0, 0.37))
-    np.testing.assert_array_equal(one.state, other.state)
-    np.testing.assert_allclose(one.state / size, end / size, atol=1e-5)
 
 
 # --- word, margins and statuses -------------------------------------------------------------------------------
@@ -433,7 +351,7 @@ def test_what_the_flow_cannot_do_is_refused() -> None:
         RoughFlow(system_of(make(ROUGH)), 10)
 
 
-@pytest.mark.parametrize("many", counts(15, 150))
+@pytest.mark.parametrize("many", counts(15, 60))
 def test_no_flow_of_a_random_shoe_fails(many: int) -> None:
     """Neither do phases that begin and end within one step pile up, nor do they graze."""
     for seed, tables in enumerate(islice(random_shoes("open", 1), many)):

@@ -8,15 +8,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
-from brakecli.solver import contact
-from brakecli.solver.contact.force import fill
-from brakecli.solver.contact.pad import build_layer, build_pad
 from brakecli.solver.roughness import PI, height, surface, wheel_angles
-from brakecli.solver.schedules import integral_at, schedule
-from tests.solver.rough_gap import EPS, Gap, Wave
+from tests.solver.rough_gap import EPS
 
 mpmath: Any = import_module("mpmath")  # imported so because it has no type hints
 mpmath.mp.dps = 50
@@ -104,111 +100,9 @@ def test_the_wheel_s_phases_stay_exact_over_ten_thousand_kilometres(
 
 # --- the force after ten thousand kilometres -----------------------------------------------------------------
 
-SHOE = ((12e-6, 0.02, 10.0), (-7e-6, 0.0071, 200.0))
-WHEEL = ((20e-6, 0.025, 0.0), (9e-6, 0.0113, 30.0), (5e-6, 0.0037, 311.0))
-A = 0.03
-K = 3e8
-
 
 def travelled(times: list[float], speeds: list[float], radius: float, t: Fraction) -> Fraction:
     """The wheel's exact way from 0 to t, after the last knot; the first knot is at 0."""
     at = [(Fraction(time), Fraction(speed) * Fraction(radius)) for time, speed in zip(times, speeds, strict=True)]
     way = sum(((v + w) / 2 * (end - start) for (start, v), (end, w) in pairwise(at)), Fraction(0))
     return way + at[-1][1] * (t - at[-1][0])
-
-
-def exact_force(numbers: list[Any], x: float, y: float, way: Fraction) -> Any:
-    """F_y with 50 digits: roots refined by Newton, the integrals from their antiderivatives."""
-    waves = [
-        (mpf(g), omega, omega * (mpf(x) - mpf(way)) + mpf(np.radians(phase)))
-        for (g, _, phase), omega in zip(WHEEL, numbers, strict=True)
-    ]
-    waves += [(-mpf(g), 2 * mpmath.pi / mpf(length), mpf(np.radians(phase))) for g, length, phase in SHOE]
-
-    def gap(xi: Any) -> Any:
-        return sum(g * mpmath.sin(omega * xi + psi) for g, omega, psi in waves) - mpf(y)
-
-    def whole(xi: Any) -> Any:
-        return sum(-g / omega * mpmath.cos(omega * xi + psi) for g, omega, psi in waves) - mpf(y) * xi
-
-    reduced = tuple(  # the same gap in doubles, its phases reduced, to know about where the roots are
-        Wave(float(g), float(2 * mpmath.pi / omega), float(mpmath.fmod(psi, 2 * mpmath.pi) * 180 / mpmath.pi))
-        for g, omega, psi in waves
-    )
-    near = Gap((), reduced, A, 0.0, y).touching()
-    total = mpmath.mpf(0)
-    for piece in near:
-        left, right = (
-            mpf(end) if abs(gap(mpf(end))) > mpmath.mpf(10) ** -14 else mpmath.findroot(gap, mpf(end))
-            for end in piece
-        )
-        total += whole(right) - whole(left)
-    return mpf(K) * total
-
-
-@pytest.mark.parametrize("evaluator", ["closed-form", "exact"])
-@pytest.mark.parametrize("t_low", [0.0, 3.7e-12, 0.37])
-@pytest.mark.parametrize(
-    ("times", "speeds", "t"),
-    [
-        ([0.0], [91.7], 98765.4321),
-        ([0.0], [-91.7], 98765.4321),
-        ([0.0, 1234.5, 60000.1, 98765.1], [3.3, 120.7, 55.5, 141.3], 98765.4321),
-        ([0.0, 1234.5, 98765.6, 98765.7], [3.3, 120.7, 155.5, 141.3], 98765.4321),
-    ],
-)
-@pytest.mark.parametrize("by_number", [False, True])
-def test_the_force_after_ten_thousand_kilometres_is_that_of_the_same_doubles(
-    evaluator: str, t_low: float, times: list[float], speeds: list[float], t: float, by_number: bool
-) -> None:
-    radius = 1.1037
-    x = 3.21e-5
-    y = -8e-5 if evaluator == "closed-form" else -4.3e-6
-    given_numbers = [2 * math.pi / length for _, length, _ in WHEEL]
-    g = [each[0] for each in WHEEL]
-    phase = [each[2] for each in WHEEL]
-    if by_number:
-        wheel = surface(g, wavenumbers=given_numbers, phases_deg=phase)
-        numbers = [mpf(number) for number in given_numbers]
-    else:
-        wheel = surface(g, wavelengths=[each[1] for each in WHEEL], phases_deg=phase)
-        numbers = [2 * mpmath.pi / mpf(each[1]) for each in WHEEL]
-    shoe = surface(
-        [each[0] for each in SHOE], wavelengths=[each[1] for each in SHOE], phases_deg=[each[2] for each in SHOE]
-    )
-    layer = build_layer(evaluator, build_pad(K, A, shoe, wheel, 0))
-    wheel_angles(wheel.waves, *integral_at(schedule(times, speeds, radius), t, t_low), layer.angles)
-    fill(x, y, *layer)
-    found = layer.contact
-
-    time = Fraction(t) + Fraction(t_low)
-    if time > Fraction(times[-1]):
-        way = travelled(times, speeds, radius, time)
-    else:  # between the last knots but one and two
-        reached = next(i for i in range(len(times)) if Fraction(times[i + 1]) >= time)
-        start = Fraction(times[reached])
-        v = Fraction(speeds[reached]) * Fraction(radius)
-        w = Fraction(speeds[reached + 1]) * Fraction(radius)
-        slope = (w - v) / (Fraction(times[reached + 1]) - start)
-        way = travelled(times[: reached + 1], speeds[: reached + 1], radius, start)
-        way += (v + slope * (time - start) / 2) * (time - start)
-    assert abs(way) > 9e6
-    scale = 2 * A * K * (abs(y) + 53e-6)
-    assert abs(mpf(float(found.normal_force)) - exact_force(numbers, x, y, way)) <= 1e-9 * scale
-    # What is really reached: phases up to 2 pi a/3.7 mm = 51 rad, in a few roundings.
-    assert abs(mpf(float(found.normal_force)) - exact_force(numbers, x, y, way)) <= 8 * 51 * EPS * scale
-    assert contact.kinds()[found.kind] == evaluator
-    if evaluator == "exact":
-        assert 0.0 < found.normal_force < 0.5 * scale
-
-
-@given(st.integers(1, 10**9))
-@settings(max_examples=20)
-def test_whole_waves_bring_the_phases_back(turns: int) -> None:
-    """A travel of whole wavelengths, 1/64 m each, is a double: the angles return to the bit."""
-    wheel = surface([1e-6, 1e-6], wavelengths=[1 / 64, 1 / 32], phases_deg=[10.0, 20.0])
-    start = np.zeros(2)
-    later = np.zeros(2)
-    wheel_angles(wheel.waves, 0.0, 0.0, start)
-    wheel_angles(wheel.waves, 2 * turns / 64, 0.0, later)
-    np.testing.assert_array_equal(later, start)

@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.interpolate import CubicHermiteSpline
-from scipy.linalg import expm
 
 from brakecli.case.system import system_of
 from brakecli.solver.arrays import Floats
@@ -18,7 +17,7 @@ from brakecli.solver.motion.flow import SmoothFlow
 from brakecli.solver.phases import BACKWARD, FORWARD, HEIGHT, OPEN, SLIDING, STICK
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
-from tests.analysis.shoes import Shoe, random_shoes
+from tests.analysis.shoes import random_shoes
 from tests.campaign import campaign, counts
 from tests.examples import ROUGH, make
 
@@ -47,7 +46,7 @@ def drawn(system: System, chance: np.random.Generator) -> tuple[Floats, float]:
     return state, chance.uniform(0.05, 2.0) / system.natural_frequencies[0]
 
 
-@pytest.mark.parametrize("number", counts(5, 300, 1000))
+@pytest.mark.parametrize("number", counts(5, 100, 1000))
 def test_the_derivative_is_that_of_central_differences(number: int) -> None:
     """Differences by 1e-5 of the sizes are off by its square, and by rounding: 1e-16 over 1e-5.
 
@@ -97,25 +96,7 @@ def test_the_derivative_is_that_of_central_differences(number: int) -> None:
     assert seen == {BACKWARD, STICK, FORWARD, OPEN}
 
 
-def test_within_one_phase_the_derivative_is_the_matrix_exponential() -> None:
-    tables, system = shoes(1)[0]
-    shoe = Shoe.of(tables)
-    rest = steady_sliding(system)
-    span = 1e-3
-    flow = SmoothFlow.of(system)
-    assert flow(np.array([rest.x, rest.y, 0.0, 0.0]), span) == DONE
-    a = np.zeros((4, 4))
-    a[:2, 2:] = np.eye(2)
-    a[2:, :2] = -shoe.stiffness / shoe.m
-    a[2:, 2:] = -shoe.b / shoe.m
-    omega = system.natural_frequencies[1] * 2.0 * np.pi
-    scales = np.array([1.0, 1.0, omega, omega])
-    exact = expm(a * span) * scales / scales[:, None]
-    np.testing.assert_allclose(flow.derivative * scales / scales[:, None], exact, rtol=0.0, atol=1e-13)
-    assert flow.word == (BACKWARD if system.belt_speed > 0.0 else FORWARD,)
-
-
-@pytest.mark.parametrize("number", counts(10, 200))
+@pytest.mark.parametrize("number", counts(10, 60))
 def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
     """Both share the automaton, but neither how a phase is followed nor how an event is found."""
     chance = np.random.default_rng(26)
@@ -134,30 +115,6 @@ def test_a_span_ends_where_a_run_of_the_other_scheme_does(number: int) -> None:
         end = np.array(solve(system_of(make(changed))).rows[-1, :4])
         largest = max(1.0, np.abs(end / scales).max(), np.abs(flow.path.high / scales).max())
         np.testing.assert_allclose(flow.state / scales, end / scales, rtol=0.0, atol=1e-9 * largest)
-
-
-@campaign
-def test_a_flow_composes_of_its_parts_and_so_does_its_derivative() -> None:
-    chance = np.random.default_rng(27)
-    for _, system in shoes(20):
-        state, span = drawn(system, chance)
-        flow = SmoothFlow.of(system)
-        scales = scales_of(system)
-        if flow(state, span) != DONE:
-            continue
-        end = flow.state
-        derivative = flow.derivative
-        spent = flow.path.spent.sum()
-        part = chance.uniform(0.2, 0.8)
-        assert spent == pytest.approx(span, rel=1e-12)
-        assert flow(state, part * span) == DONE
-        middle = flow.state
-        first = flow.derivative
-        assert flow(middle, (1.0 - part) * span) == DONE
-        np.testing.assert_allclose(flow.state / scales, end / scales, rtol=1e-9, atol=1e-9)
-        product = flow.derivative @ first * scales / scales[:, None]
-        atol = 1e-8 * max(1.0, np.abs(first).max())
-        np.testing.assert_allclose(product, derivative * scales / scales[:, None], rtol=1e-8, atol=atol)
 
 
 def test_the_velocity_at_both_ends_is_that_of_the_forces() -> None:
@@ -217,15 +174,6 @@ def test_a_margin_that_rises_at_both_ends_may_be_lowest_inside(slope: float) -> 
     place = max(cubic.derivative().roots())
     assert lowest(0.1, slope, 0.12, 1.5) == pytest.approx((place, float(cubic(place))), rel=1e-12)
     assert lowest(0.1, 1.0, 2.0, 1.0)[0] == -1.0  # it rises all the way
-
-
-@pytest.mark.parametrize("fall", [-1e-30, -1e-9, -0.3])
-def test_the_lowest_place_of_a_margin_is_that_of_its_cubic(fall: float) -> None:
-    """Also where it hardly falls: then rounding leaves nothing of what the place was divided by."""
-    for end, rise in ((1.1, 2.0), (0.5, 0.1), (3.0, 0.2)):
-        cubic = CubicHermiteSpline([0.0, 1.0], [1.0, end], [fall, rise])
-        inside = [cubic(place) for place in cubic.derivative().roots() if 0.0 <= place <= 1.0]
-        assert lowest(1.0, fall, end, rise)[1] == pytest.approx(min(inside), rel=1e-12)
 
 
 def test_rough_pads_and_changing_speeds_are_refused() -> None:

@@ -10,18 +10,14 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from brakecli.analysis.branches.forced import Forced
-from brakecli.analysis.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import Motion, Stepping, solve
-from brakecli.solver.period import common_period
 from brakecli.solver.system import System
 from brakecli.solver.tangent import exponents
 from tests.analysis.shoes import Tables, random_shoes
 from tests.campaign import campaign
-from tests.examples import MODE_COUPLING, SQUEAL, make
-from tests.studies.sweeps.shoes import drawn as opening
+from tests.examples import SQUEAL, make
 
 pytestmark = pytest.mark.usefixtures("compiled")
 Array = Any
@@ -116,39 +112,6 @@ def test_at_events_nothing_is_lost_or_gained(number: int, frequency: float) -> N
     motion = solve(replace(system_of(case), tangents=True))
     assert motion.exponent is not None
     assert abs(motion.exponent.rate) < 1e-3 * frequency
-
-
-def test_a_forced_motion_has_the_exponent_of_its_multiplier() -> None:
-    """ln |μ| / T, by the derivative of a common period of the waves, of a pad that opens."""
-    tables, key, low, high, _ = opening(6, "opening")
-    line = Line(make(tables), [key.replace("__", ".")], low, high)
-    p = line.place(1.0)
-    point = Forced.along(line).begin(p)
-    period = common_period(line.system(p))
-    assert point is not None
-    assert period is not None
-    expected = math.log(float(np.abs(point.multipliers).max())) / period
-    names = dict(zip(("x", "y", "vx", "vy"), point.facts.state, strict=True))
-    table, name = key.split("__")
-    tables = {**tables, table: {**tables[table], name: 1.0}, "initial": names}
-    tables["solver"] = {"duration": 500 * period}
-    tables["output"] = {"sample_interval": 1e-4}
-    system = system_of(by_scheme(tables, "event-driven", solver__tolerance=1e-6))
-    motion = solve(replace(system, tangents=True))
-    assert (motion.rows[:, 6] < 1.0).any()
-    assert motion.exponent is not None
-    assert motion.exponent.rate == pytest.approx(expected, abs=3.0 * motion.exponent.error, rel=1e-3)
-    assert motion.exponent.error < 0.02 * abs(expected)
-
-
-@pytest.mark.parametrize("scheme", ["piecewise-exact", "event-driven"])
-def test_it_grows_as_published_of_the_minimal_model_of_mode_coupling(scheme: str) -> None:
-    """N. Hoffmann et al., Mech. Res. Comm. 29 (2002) 197-205: ω² = 2 ± i √(1/3) where 4/3 φ = 4/3."""
-    case = by_scheme(MODE_COUPLING, scheme, solver__duration=60.0, initial__x=1e-6)
-    motion = solve(replace(system_of(case), tangents=True))
-    published = (complex(2.0, math.sqrt(1.0 / 3.0)) ** 0.5).imag
-    assert motion.exponent is not None
-    assert abs(motion.exponent.rate - published) < motion.exponent.error < 1e-2 * published
 
 
 def test_the_disturbance_changes_nothing_of_the_motion() -> None:

@@ -118,6 +118,16 @@ class Phasewise:
             if len(times) > most_events:
                 raise ArithmeticError("too many events")
 
+    def samples(self, state: Vector, interval: float, count: int) -> tuple[Vector, set[str]]:
+        """The state at equal intervals (s), the first one included, and all phases on the way."""
+        states = [state]
+        seen = set[str]()
+        for _ in range(count):
+            way = self(states[-1], interval)
+            states.append(way.end)
+            seen |= set(way.word)
+        return np.array(states), seen
+
     def _next(self, phase: str, which: int, z: Vector) -> tuple[str, tuple[int, int]]:
         """The next phase, and which of its margins is zero there, and how often. Rounding is taken from z."""
         if which == 0:
