@@ -7,13 +7,11 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.regime.context import Context
-from brakecli.analysis.regime.decision import Excitation, Regime
+from brakecli.analysis.regime.decision import Regime
 from brakecli.analysis.spectrum import peak, spectrum
-from brakecli.case.system import system_of
 from brakecli.solver.quantities import ContactState
 from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
-from tests.analysis.test_verdicts import DRUM
-from tests.campaign import campaign, counts
+from tests.campaign import counts
 from tests.examples import SQUEAL, make
 
 
@@ -29,36 +27,6 @@ def test_no_shoe_that_sticks_after_a_hard_start_has_died_out(draws: int) -> None
         verdict = verdict_of(make(SQUEAL, **changes, solver__duration=0.5))
         assert verdict.regime is not Regime.DAMPED, changes
         assert "died out" not in verdict.reasons[0]
-
-
-@campaign
-def test_each_drum_that_swings_once_per_turn_is_forced_by_the_static_amount() -> None:
-    """S z = (φ, 1) 2ak g: inertia and dashpots add (4 Hz over 200 Hz)², the length of the pad takes 0.7 %."""
-    rng = np.random.default_rng(13)
-    turn = np.linspace(0.0, 2.0 * np.pi, 10_001)
-    for _ in range(10):
-        part = int(rng.integers(2, 4))
-        high = 10e-6 * rng.uniform(0.5, 3.0, 2)
-        waves = {"amplitudes": high.tolist(), "wavelengths": [3.0, 3.0 / part]}
-        changes: dict[str, Any] = {
-            "wheel__angular_speed": rng.uniform(6.0, 9.0),
-            "friction__coefficient": rng.uniform(0.1, 0.4),
-            "link2__angle_deg": rng.uniform(5.0, 20.0),
-            "link1__damping": 3000.0,
-            "link2__damping": 3000.0,
-            "load__force": rng.uniform(12e3, 20e3),
-            "solver__step": 5e-5,
-        }
-        case = make(DRUM | {"roughness": {"wheel": waves}}, **changes)
-        c = system_of(case).coefficients
-        k = 2e7
-        verdict = verdict_of(case)
-        s = np.array([[c.c_xx, c.c_xy + c.phi * k], [c.c_xy, c.c_yy + k]])
-        swing = k * 0.5 * np.ptp(high[0] * np.sin(turn) + high[1] * np.sin(part * turn))
-        static = abs(float(np.linalg.solve(s, [c.phi, 1.0])[0]) * swing)
-        assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED), verdict.reasons
-        assert verdict.amplitude == pytest.approx(static, rel=0.015)
-        assert verdict.amplitude_forced == pytest.approx(static, rel=0.015)
 
 
 @pytest.mark.parametrize("draws", counts(3, 10))

@@ -83,15 +83,3 @@ def test_neighbours_are_nearest_wherever_two_eigenvalues_are_far_apart(shoes: in
                 assert moved < swapped
                 compared += 1
     assert compared > 100 * shoes
-
-
-def test_two_overdamped_modes_keep_their_slow_eigenvalues() -> None:
-    """Beyond 24,000 N·s/m all four eigenvalues of this shoe are real; those that are slow vary without a jump."""
-    dampings = np.linspace(30e3, 60e3, 61)
-    shoes = [
-        coefficients(mass=10, c_1=1e7, b_1=b, beta_deg=0, c_2=1.2e7, b_2=b, alpha_deg=5, phi=0.7) for b in dampings
-    ]
-    rates = np.array([values_of(pair) for pair in followed(tuple(modes(c, 2e6, 0.7)) for c in shoes)])
-    slow = [np.sort(np.linalg.eigvals(full_matrix(c, 2e6, 0.7)).real)[2:] for c in shoes]
-    assert np.sort(rates.real, axis=1) == pytest.approx(np.array(slow), rel=1e-6)
-    assert not rates.imag.any()

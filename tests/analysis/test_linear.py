@@ -61,25 +61,3 @@ def test_where_two_modes_have_met_nothing_is_said_of_growth() -> None:
     assert other is not None
     assert (met.direction, met.known_to) == (0, math.inf)
     assert other.direction != 0
-
-
-def test_a_rest_and_its_modes_obey_the_equations() -> None:
-    """(6) and (7) at rest, and (λ² m + λ B + S) v = 0, by the constants of the case."""
-    for system in shoes():
-        if (theory := linear_theory(system, system.belt_speed)) is None:
-            continue
-        c = system.coefficients
-        k = system.contact_stiffness
-        grip = math.copysign(c.phi, system.belt_speed)
-        x, y = theory.rest
-        load = system.load_at_start
-        along = c.c_xx * x + c.c_xy * y + load * c.sin_beta - grip * theory.force
-        across = c.c_xy * x + c.c_yy * y + load * c.cos_beta - theory.force
-        assert max(abs(along), abs(across)) <= 1e-12 * (abs(load) + (c.c_xx + c.c_yy) * abs(theory.rest).max())
-        b = np.array([[c.b_xx, c.b_xy], [c.b_xy, c.b_yy]])
-        s = np.array([[c.c_xx, c.c_xy + grip * k], [c.c_xy, c.c_yy + k]])
-        for value, vector in zip(theory.values, theory.vectors.T, strict=True):
-            left = (value**2 * c.m * np.eye(2) + value * b + s) @ vector[:2]
-            scale = abs(value) ** 2 * c.m + abs(value) * np.abs(b).max() + np.abs(s).max()
-            assert np.abs(left).max() <= 1e-9 * scale * np.abs(vector[:2]).max()
-            assert np.allclose(vector[2:], value * vector[:2], rtol=1e-12)

@@ -31,7 +31,7 @@ IN_DOUBT = {  # at 20 dB and worse
     ("per_cycle", "quantity"),
     [
         pytest.param(n, quantity, marks=() if (n, k) in ((10, 0), (10, 2)) else campaign)
-        for n in (10, 20, 50, 200, 1000)
+        for n in (10, 50, 1000)
         for k, quantity in enumerate((Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.FORCE))
     ],
 )
@@ -103,8 +103,7 @@ def test_frequency_and_amplitude_of_a_sine_are_those_of_its_displacement() -> No
     assert look(Signal(stiffness * x, 1e-3), quantity=Measurand.FORCE).verdict.amplitude is None
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.3, 1.0, 3.0])
-@pytest.mark.parametrize("frequency", [900.0, 900.13])
+@pytest.mark.parametrize(("noise", "frequency"), [(0.0, 900.13), (1.0, 900.0), (3.0, 900.13)])
 def test_the_amplitude_of_an_acceleration_is_that_of_its_tone_and_not_of_integrated_noise(
     noise: float, frequency: float
 ) -> None:
@@ -120,8 +119,7 @@ def test_the_amplitude_of_an_acceleration_is_that_of_its_tone_and_not_of_integra
     assert abs(found.amplitude - true) <= 1e-3 * true + 3.0 * found.amplitude_spread
 
 
-@pytest.mark.parametrize("quantity", [Measurand.DISPLACEMENT, Measurand.VELOCITY, Measurand.ACCELERATION])
-@pytest.mark.parametrize("slip", [0.1, 0.3])
+@pytest.mark.parametrize(("quantity", "slip"), [(Measurand.VELOCITY, 0.3), (Measurand.ACCELERATION, 0.1)])
 def test_the_amplitude_of_stick_slip_among_noise_is_that_of_its_displacement(
     quantity: Measurand, slip: float
 ) -> None:
@@ -216,7 +214,7 @@ def test_a_measurement_does_not_show_what_drives_it_and_keeps_its_thresholds() -
     assert found.thresholds.fewest_cycles == 1000.0
 
 
-@pytest.mark.parametrize("cycles", [12.5, 40.3, 325.6])
+@pytest.mark.parametrize("cycles", [12.5, 325.6])
 @pytest.mark.parametrize("form", ["sine", "saw-teeth"])
 def test_a_frequency_is_better_than_one_over_the_length_of_the_record(cycles: float, form: str) -> None:
     phase = np.arange(20_000) * cycles / 20_000

@@ -55,14 +55,6 @@ def test_a_tone_is_found_with_its_numbers() -> None:
     assert vibration.speed in found.speed
 
 
-def test_the_power_in_a_window_is_that_of_the_motion() -> None:
-    found = over_time(burst(0.0, 4.0), SYSTEM)
-    assert found is not None
-    power = found.density.sum(axis=1) * (found.lines[1] - found.lines[0])
-    # a Hann window weighs the squares by one in the mean; its line lies far from both ends of the spectrum
-    np.testing.assert_allclose(power, 0.5 * (2.0 * math.pi * FREQUENCY * AMPLITUDE) ** 2, rtol=1e-3)
-
-
 def test_two_bursts_are_two_intervals_and_what_is_faint_is_none() -> None:
     first, second = (burst(*ends) for ends in ((0.5, 1.0), (2.0, 3.0)))
     rows = [np.stack([h.read(name, 0, 40_000) for name in HISTORY], axis=1) for h in (first, second)]

@@ -1,7 +1,6 @@
 """Regimes of runs whose regime is known, and of histories made by hand."""
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,9 +13,8 @@ from brakecli.analysis.regime.decision import Excitation, Regime, Thresholds
 from brakecli.analysis.regime.spectra import forced_lines
 from brakecli.analysis.regime.statistics import statistics
 from brakecli.solver.history import History
-from brakecli.solver.track import MIN, SLIP, STICK, Events
-from tests.analysis.histories import INTERVAL, classified, history_of, lasting, track_of, verdict_of
-from tests.examples import COULOMB, ROUGH, SQUEAL, make
+from tests.analysis.histories import INTERVAL, classified, history_of, lasting, verdict_of
+from tests.examples import COULOMB, SQUEAL, make
 
 TIME = INTERVAL * np.arange(20000)
 
@@ -24,26 +22,6 @@ TIME = INTERVAL * np.arange(20000)
 def made(vx: NDArray[np.float64], state: float | NDArray[np.float64] = -1.0) -> History:
     """A motion to which friction gives energy."""
     return history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, friction_force=vx, state=state)
-
-
-@pytest.mark.parametrize(
-    ("phi", "omega", "regime"),
-    [
-        (0.5, 0.1, Regime.DAMPED),
-        (0.6, 0.1, Regime.RELAXATION),
-        (0.8, 0.3, Regime.RELAXATION),
-        (0.6, 0.6, Regime.QUASI_HARMONIC),
-    ],
-)
-def test_the_three_regimes_of_the_paper(phi: float, omega: float, regime: Regime) -> None:
-    case = make(SQUEAL, friction__coefficient=phi, wheel__angular_speed=omega, solver__duration=2.0)
-    verdict = verdict_of(case)
-    assert verdict.regime is regime
-    sustained = regime is not Regime.DAMPED
-    assert verdict.excitation is (Excitation.SELF_EXCITED if sustained else Excitation.NONE)
-    assert (verdict.frequency is not None) == sustained
-    assert sustained is False or verdict.frequency == pytest.approx(174.0, abs=1.0)
-    assert (verdict.stick_fraction > 0.02) == (regime is Regime.RELAXATION)
 
 
 def test_where_rises_miss_the_lines_of_a_motion_the_strongest_line_is_its_frequency() -> None:
@@ -70,12 +48,6 @@ def test_an_amplitude_that_varies_by_as_much_as_itself_is_not_settled() -> None:
     assert settled == [(False, False, 2), (True, True, 1)]
 
 
-def test_a_shoe_shaken_by_roughness_below_its_critical_friction_is_damped_and_forced() -> None:
-    verdict = verdict_of(make(ROUGH, solver__duration=1.0, solver__step=2e-5))
-    assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED)
-    assert verdict.frequency is None
-
-
 def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
     verdict = verdict_of(make(COULOMB))
     assert verdict.regime is Regime.DAMPED
@@ -83,7 +55,7 @@ def test_a_shoe_at_rest_on_a_standing_wheel_is_damped() -> None:
     assert verdict.stick_fraction == 1.0
 
 
-@pytest.mark.parametrize("place", [0.1, 0.3, 0.7, 1.0 / 3.0, -12.34567, 1e-9 / 7.0])
+@pytest.mark.parametrize("place", [0.3, -12.34567, 1e-9 / 7.0])
 def test_a_shoe_at_rest_has_settled_wherever_it_rests(place: float) -> None:
     """The mean of equal numbers may differ from them by rounding: nothing else moves there."""
     time = INTERVAL * np.arange(6001)
@@ -231,15 +203,6 @@ def test_a_changing_wheel_speed_is_undecided() -> None:
     assert "changes with time" in verdict.reasons[0]
 
 
-def test_verdict_does_not_depend_on_length_or_sampling() -> None:
-    base: dict[str, Any] = {"friction__coefficient": 0.7, "solver__duration": 1.0}
-    changes: list[dict[str, Any]] = [{}, {"solver__duration": 2.0}, {"output__sample_interval": 5e-5}]
-    verdicts = [verdict_of(make(SQUEAL, **{**base, **change})) for change in changes]
-    assert {verdict.regime for verdict in verdicts} == {Regime.RELAXATION}
-    frequencies = [verdict.frequency or 0.0 for verdict in verdicts]
-    assert np.ptp(frequencies) < 0.1
-
-
 def test_evidence_names_lines_harmonics_and_powers() -> None:
     verdict = verdict_of(make(SQUEAL, friction__coefficient=0.7, solver__duration=2.0))
     evidence = verdict.evidence
@@ -282,32 +245,6 @@ def test_bands_whose_frequency_wanders_hold_no_vibration() -> None:
         frequency = 150.0 * np.interp(TIME, np.linspace(0.0, TIME[-1], 20), drawn)
         verdict = lasting(made(np.sin(2 * np.pi * np.cumsum(frequency) * INTERVAL)), Context(2.0))
         assert verdict.regime is regime, verdict.reasons
-
-
-@pytest.mark.parametrize("samples_per_cycle", [9.45, 10.4, 11.4, 12.45, 13.0, 16.0, 24.0])
-def test_cycles_of_few_samples_have_the_right_length_and_stick(samples_per_cycle: float) -> None:
-    """A cycle need not take whole samples, and a stick between two samples is seen as the loop sees it."""
-    phase = (np.arange(4000) / samples_per_cycle + 0.013) % 1.0
-    sticks = phase < 0.1
-    slip = (phase - 0.1) / 0.9
-    vx = np.where(sticks, 0.01, 0.01 * np.cos(2.0 * np.pi * slip) - 0.004 * np.sin(4.0 * np.pi * slip))
-    motion = history_of(4000, vx=vx, x=np.cumsum(vx) * INTERVAL, state=np.where(sticks, 0.0, -1.0))
-    track = track_of(motion)
-    turns = track.kept.kind <= MIN
-    cycle = np.arange(1, int(4000 / samples_per_cycle))
-    begins, ends = (INTERVAL * samples_per_cycle * (cycle + place - 0.013) for place in (0.0, 0.1))
-    time = np.concatenate([track.kept.time[turns], begins, ends])
-    kind = np.concatenate([track.kept.kind[turns], np.full(len(cycle), STICK), np.full(len(cycle), SLIP)])
-    x = np.concatenate([track.kept.x[turns], np.zeros(2 * len(cycle))])
-    order = np.argsort(time)
-    kept = Events(time[order], kind[order].astype(np.int8), x[order], np.zeros((len(time), 3)))
-    verdict = lasting(motion, Context(0.01), track=replace(track, kept=kept))
-    assert verdict.frequency == pytest.approx(1.0 / (samples_per_cycle * INTERVAL), rel=1e-4)
-    assert verdict.stick_fraction == pytest.approx(0.1, rel=2e-3)  # turning points are by samples here
-    assert (verdict.evidence["stick_cycles"], verdict.evidence["stick_spread"]) == (
-        1.0,
-        pytest.approx(0.0, abs=1e-3),
-    )
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,6 @@ from brakecli.analysis.stability.report import StabilityReport, stability
 from brakecli.case.case import Case
 from brakecli.case.system import system_of
 from tests.analysis.histories import verdict_of
-from tests.campaign import campaign, counts
 from tests.examples import SQUEAL, make
 
 SHOES = [  # α in degrees, c2/c1, k in N/m²
@@ -49,12 +48,9 @@ def disturbed(report: StabilityReport, frequency: float, seconds: float) -> dict
     }
 
 
-@pytest.mark.parametrize("mirrored", [False, pytest.param(True, marks=campaign)])
 @pytest.mark.parametrize("motion", ["below", "slow wheel", "fast wheel"])
-@pytest.mark.parametrize("kind", SHOES)
-def test_flat_shoes_ten_percent_off_their_critical_friction(
-    kind: tuple[float, float, float], motion: str, mirrored: bool
-) -> None:
+@pytest.mark.parametrize("kind", SHOES[::2])
+def test_flat_shoes_ten_percent_off_their_critical_friction(kind: tuple[float, float, float], motion: str) -> None:
     flat = stability(system_of(shoe(kind)))
     assert flat.critical is not None
     assert flat.equilibrium is not None
@@ -62,11 +58,9 @@ def test_flat_shoes_ten_percent_off_their_critical_friction(
     # that keeps the pad on the wheel, and by loss of contact where it is the other way round.
     lift_off = 2.0 * math.pi * flat.critical.frequency * abs(flat.equilibrium.y)
     speed = {"below": 0.05, "slow wheel": 0.02 * lift_off, "fast wheel": 3.0 * lift_off}[motion]
-    sign = -1.0 if mirrored else 1.0
     changes: dict[str, Any] = {
         "friction__coefficient": flat.critical.friction * (0.9 if motion == "below" else 1.1),
-        "wheel__angular_speed": sign * 2.0 * speed,
-        "link2__angle_deg": sign * kind[0],
+        "wheel__angular_speed": 2.0 * speed,
     }
     report = stability(system_of(shoe(kind, **changes)))
     assert (report.modes[0].growth > 0.0) == (motion != "below")
@@ -82,7 +76,7 @@ def test_flat_shoes_ten_percent_off_their_critical_friction(
 
 
 @pytest.mark.parametrize("waves", ROUGHNESS)
-@pytest.mark.parametrize("kind", SHOES[1:3])
+@pytest.mark.parametrize("kind", SHOES[1:2])
 def test_roughness_below_the_critical_friction_forces_and_does_not_excite(
     kind: tuple[float, float, float], waves: dict[str, Any]
 ) -> None:
@@ -94,28 +88,6 @@ def test_roughness_below_the_critical_friction_forces_and_does_not_excite(
     times = disturbed(report, 180.0, 15.0 / abs(report.modes[0].growth))
     verdict = verdict_of(shoe(kind, **changes, **times))
     assert (verdict.regime, verdict.excitation) == (Regime.DAMPED, Excitation.FORCED), verdict.reasons
-
-
-@pytest.mark.parametrize("kind", SHOES[:3])
-def test_without_friction_every_damped_shoe_is_damped(kind: tuple[float, float, float]) -> None:
-    case = shoe(kind, friction__coefficient=0.0)
-    times = disturbed(stability(system_of(case)), 180.0, 2.0)
-    assert verdict_of(shoe(kind, friction__coefficient=0.0, **times)).regime is Regime.DAMPED
-
-
-@pytest.mark.parametrize("kind", SHOES[:3])
-def test_on_a_standing_wheel_a_shoe_comes_to_rest(kind: tuple[float, float, float]) -> None:
-    changes: dict[str, Any] = {"wheel__angular_speed": 0.0, "initial__vx": 0.05, "solver__duration": 1.0}
-    verdict = verdict_of(shoe(kind, **changes))
-    assert verdict.regime is Regime.DAMPED
-    assert verdict.excitation is Excitation.NONE
-
-
-@pytest.mark.parametrize("kind", SHOES[:2])
-def test_a_shoe_that_is_pulled_off_has_no_regime(kind: tuple[float, float, float]) -> None:
-    verdict = verdict_of(shoe(kind, load__force=-2000.0, solver__duration=1.0))
-    assert verdict.regime is Regime.UNDECIDED
-    assert "never touched" in verdict.reasons[0]
 
 
 def test_steady_sliding_left_alone_is_damped_and_not_rounding_that_vibrates() -> None:
@@ -144,36 +116,6 @@ def random_case(rng: np.random.Generator) -> dict[str, Any]:
         "contact": {"half_length": 0.05, "stiffness": contact / 0.1},
         "solver": {"step": 1e-6, "duration": 1e-5},
     }
-
-
-@pytest.mark.parametrize("shoes", counts(20, 200))
-def test_random_shoes_are_never_judged_against_their_eigenvalues(shoes: int) -> None:
-    rng = np.random.default_rng(11)
-    judgements: dict[tuple[bool, Regime], int] = {}
-    while sum(judgements.values()) < shoes:
-        tables = random_case(rng)
-        critical = stability(system_of(make(tables))).critical
-        if critical is not None and critical.friction < 3.0:
-            tables["friction"] = {"coefficient": critical.friction * rng.uniform(0.6, 1.5)}
-        elif rng.uniform() < 0.8:
-            continue  # most random shoes never lose stability: a few of them are enough
-        report = stability(system_of(make(tables)))
-        if report.equilibrium is None or report.equilibrium.normal_force <= 0.0:
-            continue
-        fast = max(mode.frequency for mode in report.modes)
-        slow = min((mode.frequency for mode in report.modes if mode.frequency > 0.0), default=fast)
-        rate = report.modes[0].growth
-        seconds = max(min(max(300.0 / fast, 14.0 / abs(rate)), 10000.0 / fast), 100.0 / slow)
-        verdict = verdict_of(make(tables, **disturbed(report, fast, seconds)))
-        key = (rate > 0.0, verdict.regime)
-        judgements[key] = judgements.get(key, 0) + 1
-        wrong = {Regime.DAMPED} if rate > 0.0 else {Regime.RELAXATION, Regime.QUASI_HARMONIC}
-        assert verdict.regime not in wrong, (tables, verdict)
-    decided = sum(count for (_, regime), count in judgements.items() if regime is not Regime.UNDECIDED)
-    assert decided >= 0.85 * shoes  # 190 of 200 when this was written; what is left grows, decays or wanders still
-    assert judgements[True, Regime.RELAXATION] > 0.05 * shoes
-    assert judgements[True, Regime.QUASI_HARMONIC] > 0.05 * shoes
-    assert judgements[False, Regime.DAMPED] > 0.25 * shoes
 
 
 CHANGES: list[dict[str, Any]] = [

@@ -61,39 +61,6 @@ def test_a_brake_of_ones_own_is_similar_to_the_starter(starter: str, brake: Brak
         assert system.belt_speed == pytest.approx(brake.speed, rel=1e-5)
 
 
-@pytest.mark.parametrize("friction", [0.2, 0.55, 0.9])
-@pytest.mark.parametrize("starter", ["case", "branch", "pad", "rough"])
-def test_a_brake_has_its_own_friction_and_the_critical_one_of_the_starter(starter: str, friction: float) -> None:
-    before = report(parse_case(STARTERS[starter], starter).case)
-    found = similar(starter, STARTERS[starter], Brake(0.4, 1900.0, 8000.0, 8.0, friction))
-    case = parse_case(found.text, starter).case
-    new = report(case)
-    assert case.friction.coefficient == friction
-    assert new.modes[0].frequency == pytest.approx(1900.0, rel=1e-5)  # of the mode at this friction
-    assert before.critical is not None
-    assert new.critical is not None
-    assert new.critical.friction == pytest.approx(before.critical.friction, rel=1e-4)
-    assert found.critical == pytest.approx(before.critical.friction, rel=1e-9)
-    assert found.before == similar(starter, STARTERS[starter], Brake()).before
-    critical = before.critical.friction
-    part = 100.0 * abs(friction / critical - 1.0)
-    far = f"lies {part:.2g} % {'above' if friction > critical else 'below'}"
-    far = f"is {friction / critical:.3g} times" if friction > 2.0 * critical else far
-    said = f"so is the critical friction, {critical:.3g}; the brake's own {friction:g} {far} that: sliding is "
-    assert f"{said}{'stable' if new.stable else 'unstable'}; U m ω/Q" in found.sentence
-    assert "a run tells what follows" in found.sentence  # where the starter sticks is known for its friction alone
-
-
-def test_waves_pass_as_often_in_a_period() -> None:
-    before = system_of(parse_case(STARTERS["rough"], "rough").case)
-    after = system_of(case_of("rough", Brake(0.4, 1900.0, 8000.0, 8.0)))
-    times = 1900.0 / report(parse_case(STARTERS["rough"], "rough").case).modes[0].frequency
-    passing = [abs(each.belt_speed) * each.wheel.turns for each in (before, after)]
-    assert passing[1] == pytest.approx(times * passing[0], rel=1e-5)
-    pads = [each.half_length * each.wheel.turns for each in (before, after)]
-    assert pads[1] == pytest.approx(pads[0], rel=1e-5)
-
-
 @pytest.mark.parametrize("brake", [*BRAKES, Brake(0.8, 1300.0, 3000.0, 5.0), Brake(0.123, 777.7, 3333.0, 7.77)])
 def test_waves_repeat_together_as_those_of_the_starter_do(brake: Brake) -> None:
     """Wavelengths of 30 to 17, after 17 of the first."""

@@ -101,9 +101,9 @@ def test_ring_downs_after_impacts_are_never_stick_slip(cases: int) -> None:
             assert judged(values, quantity).regime != Regime.RELAXATION, (seed, quantity)
 
 
-@pytest.mark.parametrize("second", [0.3, 0.5, 0.8])
-@pytest.mark.parametrize("third", [0.25, 1.0 / 3.0, 0.6])
-@pytest.mark.parametrize("decibels", [20, 60])
+@pytest.mark.parametrize(
+    ("second", "third", "decibels"), [(0.3, 0.6, 60), (0.5, 0.25, 20), (0.5, 1.0 / 3.0, 60), (0.8, 1.0 / 3.0, 20)]
+)
 def test_three_lines_in_step_are_never_stick_slip(second: float, third: float, decibels: int) -> None:
     phase = 0.1203 * np.arange(8000)
     lines = [(1.0, 1), (second, 2), (third, 3)]
@@ -113,7 +113,7 @@ def test_three_lines_in_step_are_never_stick_slip(second: float, third: float, d
         assert judged(values + values.std() * noise, quantity).regime != Regime.RELAXATION
 
 
-@pytest.mark.parametrize("seed", range(8))
+@pytest.mark.parametrize("seed", range(3))
 def test_spikes_of_one_sign_are_never_stick_slip(seed: int) -> None:
     random = np.random.default_rng(seed)
     values = random.normal(size=10000)

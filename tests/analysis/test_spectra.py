@@ -59,8 +59,9 @@ def test_a_long_history_takes_segments_of_bounded_length(monkeypatch: pytest.Mon
     assert peak(lines.frequency, lines.density["vx"]) == pytest.approx(500.0, abs=4.0)
 
 
-@pytest.mark.parametrize("value", [0.0, 1.0, -0.0, 5e-324, 1e-310, 1e15])
-@pytest.mark.parametrize("samples", [1, 2, 3, 17, 1000])
+@pytest.mark.parametrize(
+    ("value", "samples"), [(0.0, 1), (-0.0, 2), (1.0, 3), (5e-324, 17), (1e-310, 2), (1e15, 1000)]
+)
 def test_constant_signals_have_no_density_and_no_nan(value: float, samples: int) -> None:
     lines = spectrum(history(np.full(samples, value)), 0)
     assert len(lines.frequency) == len(lines.density["vx"])
@@ -84,21 +85,6 @@ def test_density_is_that_of_scipy(samples: int) -> None:
     _, density = welch(noise, 1.0 / INTERVAL, nperseg=size, noverlap=size // 2)
     # Both sum the same numbers, but for the scale that is taken out here and put back.
     np.testing.assert_allclose(lines.density["vx"], density, rtol=1e-12, atol=1e-15 * density.max())
-
-
-@pytest.mark.parametrize(("frequency", "samples"), [(4.0, 20000), (174.0, 200), (20.0, 2000)])
-def test_a_peak_of_few_bins_or_cycles_is_left_out(frequency: float, samples: int) -> None:
-    lines = spectrum(history(sine(frequency, samples)), 0)
-    assert peak(lines.frequency, lines.density["vx"], samples * INTERVAL) is None
-
-
-def test_no_peak_is_named_beside_a_stronger_line_that_is_not_resolved() -> None:
-    lines = spectrum(history(sine(8.0, 2000, 0.2) + sine(312.0, 2000)), 0)
-    slow = 2.0 * float(lines.frequency[1])
-    density = lines.density["vx"]
-    duration = 2000 * INTERVAL
-    assert peak(lines.frequency, density, duration, slow) is None
-    assert peak(lines.frequency, density, duration, 312.0) == peak(lines.frequency, density, duration)
 
 
 @pytest.mark.parametrize("samples", [1500, 4000, 20000])

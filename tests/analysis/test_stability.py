@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from brakecli.analysis.stability.modes import crossings, eigensystem, growth, modes
+from brakecli.analysis.stability.modes import crossings, modes
 from brakecli.analysis.stability.report import stability, step_limit, undamped_critical
 from brakecli.case.system import system_of
 from brakecli.solver.coefficients import Coefficients
@@ -14,10 +14,10 @@ from brakecli.solver.contact.pad import build_layer
 from brakecli.solver.links import coefficients, natural_frequencies
 from brakecli.solver.steady_sliding import PLACES, add_places, averaged_length
 from brakecli.solver.system import System
-from tests.analysis.mirrored import mirrored, rough_shoe
+from tests.analysis.mirrored import mirrored
 from tests.analysis.shoes import Tables
-from tests.campaign import campaign, counts
-from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make, simulate
+from tests.campaign import counts
+from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 
 
 def random_shoe(rng: np.random.Generator, damping: float) -> tuple[Coefficients, float]:
@@ -98,61 +98,12 @@ def test_every_crossing_of_random_damped_shoes_is_found(shoes: int) -> None:
     assert lost > shoes / 6
 
 
-def test_growth_is_zero_at_a_crossing() -> None:
-    system = system_of(make(SQUEAL))
-    crossing = crossings(system.coefficients, system.contact_stiffness, 1.0)[0]
-    assert crossing.friction == pytest.approx(0.575, abs=5e-4)
-    rate = growth(system.coefficients, system.contact_stiffness, crossing.friction)
-    assert abs(rate) < 1e-8 * 2 * math.pi * crossing.frequency
-    values, _ = eigensystem(system.coefficients, system.contact_stiffness, crossing.friction)
-    assert values[np.argmax(values.real)].imag / (2 * math.pi) == pytest.approx(
-        math.copysign(crossing.frequency, values[np.argmax(values.real)].imag), rel=1e-9
-    )
-
-
-@pytest.mark.parametrize("alpha", [1.0, 5.0, 20.0, 45.0])
-@pytest.mark.parametrize("ratio", [0.02, 0.2, 1.0])
-def test_least_critical_friction_lies_at_c2_equal_c1_plus_k(alpha: float, ratio: float) -> None:
-    c_1 = 1e7
-    k = ratio * 1e7
-
-    def critical(c_2: float) -> float:
-        c = coefficients(mass=10, c_1=c_1, b_1=0, beta_deg=0, c_2=c_2, b_2=0, alpha_deg=alpha, phi=0)
-        flutter = undamped_critical(c, k, 1.0)[0]
-        assert flutter is not None
-        return flutter
-
-    least = critical(c_1 + k)
-    assert least == pytest.approx((1.0 + c_1 / k) * math.tan(math.radians(alpha)), rel=1e-12)
-    assert all(critical((c_1 + k) * factor) > least for factor in (0.5, 0.9, 0.99, 1.01, 1.1, 2.0))
-
-
-def test_decoupled_shoe_never_loses_stability() -> None:
-    report = stability(system_of(make(SQUEAL, link2__angle_deg=0.0)))
-    assert report.critical is None
-    assert report.crossings == ()
-    assert report.stable is True
-
-
 def test_positive_coupling_diverges_and_does_not_flutter() -> None:
     report = stability(system_of(make(SQUEAL, link2__angle_deg=-5.0)))
     assert report.critical is not None
     assert report.critical.instability == "divergence"
     assert report.undamped_flutter is None
     assert report.critical.friction == pytest.approx(report.undamped_divergence, rel=1e-12)
-
-
-@pytest.mark.parametrize("base", [SQUEAL, MODE_COUPLING])
-def test_wheel_turning_backwards_is_the_mirror_image(base: dict[str, Any]) -> None:
-    forwards = stability(system_of(make(base)))
-    angles = {f"{link}__angle_deg": -base[link].get("angle_deg", 0.0) for link in ("link1", "link2")}
-    backwards = stability(system_of(make(base, wheel__angular_speed=-base["wheel"]["angular_speed"], **angles)))
-    assert forwards.critical is not None
-    assert backwards.critical is not None
-    assert backwards.critical.friction == pytest.approx(forwards.critical.friction, rel=1e-12)
-    assert forwards.discrete is not None
-    assert backwards.discrete is not None
-    assert backwards.discrete.spectral_radius == pytest.approx(forwards.discrete.spectral_radius, rel=1e-12)
 
 
 def test_a_standing_wheel_has_no_critical_friction() -> None:
@@ -170,22 +121,6 @@ def test_a_shoe_that_clears_the_wheel_says_so() -> None:
     assert free.equilibrium is None
     assert "lifts the shoe" in str(free.no_equilibrium)
     assert free.stable is None
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"load__force": 0.0},
-        {"link1__angle_deg": 90.0, "link2__angle_deg": 0.0},  # cos 90° is 6e-17, and not 0
-        {"load__force": -100.0},
-    ],
-)
-def test_a_shoe_that_nothing_presses_is_not_called_stable(changes: dict[str, Any]) -> None:
-    system = system_of(make(SQUEAL, **changes))
-    found = stability(system)
-    assert found.stable is None
-    assert found.equilibrium is None
-    assert "nothing presses the shoe" in str(found.no_equilibrium)
 
 
 def test_links_in_one_line_press_nothing_whatever_rounding_makes_of_what_they_leave() -> None:
@@ -266,36 +201,6 @@ def test_no_limit_is_seen_in_the_rounding_of_a_contact_that_is_all_but_rigid(
     found = step_limit(system, lambda friction: system.contact_stiffness)
     omega = 2.0 * math.pi * natural_frequencies(system.coefficients, system.contact_stiffness)[1]
     assert found == (limit if limit is None else pytest.approx(limit / omega, rel=1e-4))
-
-
-@pytest.mark.parametrize(("scheme", "theta"), [("two-layer", (0.6, 0.7)), ("three-layer", (0.3, 0.4, 0.3))])
-def test_discrete_growth_is_that_of_a_run_with_the_same_step(scheme: str, theta: tuple[float, ...]) -> None:
-    case = make(
-        MODE_COUPLING, solver__scheme=scheme, solver__theta=theta, solver__step=0.02, solver__duration=80.0,
-        initial__x=1e-7,
-    )  # fmt: skip
-    report = stability(system_of(case))
-    assert report.discrete is not None
-    late = simulate(case).vx[-2000:]
-    recurrence = np.linalg.lstsq(np.column_stack([late[1:-1], late[:-2]]), late[2:], rcond=None)[0]
-    assert math.log(math.sqrt(-recurrence[1])) / 0.02 == pytest.approx(report.discrete.growth, abs=1e-6)
-
-
-def test_roughness_in_full_contact_does_not_move_the_critical_friction() -> None:
-    rough = {"roughness__wheel": {"amplitudes": [1e-5], "wavelengths": [0.03]}}
-    flat = stability(system_of(make(SQUEAL)))
-    touching = stability(system_of(make(SQUEAL, **rough)))
-    assert flat.critical is not None
-    assert touching.critical is not None
-    assert touching.critical.friction == pytest.approx(flat.critical.friction, abs=1e-9)
-
-
-def test_roughness_that_opens_the_pad_softens_the_contact() -> None:
-    report = stability(system_of(make(ROUGH)))
-    assert report.equilibrium is not None
-    assert 0.5 < report.equilibrium.contact_fraction < 0.95
-    full = system_of(make(ROUGH)).contact_stiffness
-    assert report.contact_stiffness == pytest.approx(report.equilibrium.contact_fraction * full, rel=1e-9)
 
 
 def test_mean_stiffness_is_the_slope_of_the_mean_force() -> None:
@@ -390,30 +295,6 @@ def test_the_bar_of_a_critical_friction_holds_what_cells_leave_out() -> None:
     assert cells.critical_error is not None
     off = abs(cells.critical.friction - exact.critical.friction)
     assert 0.5 * off < cells.critical_error < 2.0 * off
-
-
-@campaign
-def test_mirror_images_of_open_pads_agree_within_their_bars() -> None:
-    tried = 0
-    for seed in range(200):
-        tables = rough_shoe(seed)
-        one, other = (stability(system_of(make(each))) for each in (tables, mirrored(tables)))
-        if one.critical is None or one.critical_error == 0.0:
-            continue
-        assert other.critical is not None
-        off = 1e-9 + (one.critical_error or 1.0) + (other.critical_error or 1.0)
-        assert abs(one.critical.friction - other.critical.friction) <= off, seed
-        tried += 1
-        if tried == 60:
-            return
-    raise AssertionError(tried)
-
-
-def test_modes_of_a_decoupled_shoe_have_the_ratios_of_single_oscillators() -> None:
-    c = coefficients(mass=10, c_1=1e7, b_1=200, beta_deg=0, c_2=4e6, b_2=300, alpha_deg=0, phi=0.3)
-    found = modes(c, 0.0, 0.0)
-    expected = sorted((300 / (2 * math.sqrt(4e7)), 200 / (2 * math.sqrt(1e8))))
-    assert sorted(mode.damping_ratio for mode in found) == pytest.approx(expected, rel=1e-12)
 
 
 def test_zeros_have_no_sign() -> None:

@@ -8,7 +8,6 @@ import pytest
 import tomli_w
 
 from brakecli.analysis.regime.classify import classify
-from brakecli.analysis.regime.context import Context
 from brakecli.analysis.regime.decision import Excitation, Regime
 from brakecli.analysis.stability.linear import linear_theory, parts
 from brakecli.analysis.stability.report import stability
@@ -18,7 +17,7 @@ from brakecli.solver.history import array_history
 from brakecli.solver.quantities import ContactState
 from brakecli.studies.runs.judge import inputs_of
 from tests.analysis.found import SHOES
-from tests.analysis.histories import INTERVAL, history_of, lasting, verdict_of
+from tests.analysis.histories import verdict_of
 from tests.campaign import counts
 from tests.commands import ROOT
 from tests.examples import SQUEAL, make, simulate
@@ -38,7 +37,7 @@ DRUM: dict[str, Any] = {  # swings once per turn of 3 m
 }
 
 
-@pytest.mark.parametrize("friction", [0.3, 0.5, 0.57, 0.574, 0.5765, 0.58])
+@pytest.mark.parametrize("friction", [0.3, 0.574, 0.5765])
 def test_a_slow_motion_is_judged_by_its_eigenvalues(friction: float) -> None:
     case = make(SQUEAL, friction__coefficient=friction, wheel__angular_speed=1.0)
     verdict = verdict_of(case)
@@ -89,13 +88,6 @@ def test_a_run_of_a_few_samples_has_a_verdict(name: str) -> None:
         assert verdict_of(case).regime is Regime.UNDECIDED
 
 
-@pytest.mark.parametrize("weights", [(0.5, 0.5), (1.0, 1.0)])
-def test_the_rate_is_that_of_the_case_and_not_of_the_scheme(weights: tuple[float, float]) -> None:
-    changes: dict[str, Any] = {"wheel__angular_speed": 1.0, "solver__theta": weights}
-    case = make(SQUEAL, friction__coefficient=0.5, **changes)
-    assert verdict_of(case).growth_rate == pytest.approx(stability(system_of(case)).modes[0].growth)
-
-
 def test_a_growing_motion_has_settled_after_the_time_that_is_told() -> None:
     changes: dict[str, Any] = {"wheel__angular_speed": 1.0, "friction__coefficient": 0.6}
     growing = verdict_of(make(SQUEAL, **changes, solver__duration=0.2))
@@ -107,20 +99,13 @@ def test_a_growing_motion_has_settled_after_the_time_that_is_told() -> None:
     assert later.growth_rate is None
 
 
-@pytest.mark.parametrize("friction", [0.0, 0.2, 0.5])
+@pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_without_dashpots_and_below_flutter_a_motion_is_neutral(friction: float) -> None:
     case = make(SQUEAL, friction__coefficient=friction, wheel__angular_speed=4.0, **UNDAMPED)
     verdict = verdict_of(case)
     assert verdict.regime is Regime.UNDECIDED
     assert "neither grows nor decays" in verdict.reasons[0]
     assert verdict.growth_rate == 0.0
-
-
-@pytest.mark.parametrize("speed", [0.002, 0.005, 0.02])
-def test_what_sticks_in_every_cycle_has_not_died_out_after_a_hard_start(speed: float) -> None:
-    changes: dict[str, Any] = {"wheel__angular_speed": speed, "initial__vx": -0.5, "solver__duration": 0.5}
-    verdict = verdict_of(make(SQUEAL, friction__coefficient=0.7, **changes))
-    assert (verdict.regime, verdict.excitation) == (Regime.RELAXATION, Excitation.SELF_EXCITED)
 
 
 def test_the_amplitude_of_what_dies_out_is_what_is_left_and_that_of_its_first_tenth_stands_beside_it() -> None:
@@ -141,10 +126,6 @@ def test_the_amplitude_of_what_dies_out_is_what_is_left_and_that_of_its_first_te
     assert first > 2.0 * last  # it dies out while one looks
     assert verdict.amplitude_first == pytest.approx(first, rel=2e-3)
     assert verdict.amplitude == pytest.approx(last, rel=2e-3)
-
-
-def test_only_what_dies_out_has_the_amplitude_of_its_first_tenth() -> None:
-    assert verdict_of(make(SQUEAL, friction__coefficient=0.9)).amplitude_first is None
 
 
 @pytest.mark.parametrize("damping", [300.0, 3000.0])
@@ -207,7 +188,7 @@ def test_the_variation_of_the_torque_waits_for_the_force_where_y_rings_longer_th
     assert verdict.torque_variation == pytest.approx(lasting, rel=0.05)  # settled_within
 
 
-@pytest.mark.parametrize("duration", [0.3, 0.5, 1.0])
+@pytest.mark.parametrize("duration", [0.3, 1.0])
 def test_a_run_of_few_turns_says_how_long_it_must_be(duration: float) -> None:
     short = verdict_of(make(DRUM, solver__duration=duration))
     needed = re.search(r"run at least ([\d.]+) s", " ".join(short.reasons))
@@ -215,43 +196,6 @@ def test_a_run_of_few_turns_says_how_long_it_must_be(duration: float) -> None:
     assert (short.regime is Regime.UNDECIDED) == (duration < 0.75)  # a turn
     assert needed is not None
     assert verdict_of(make(DRUM, solver__duration=float(needed[1]))).settled
-
-
-@pytest.mark.parametrize("seed", range(3))
-def test_what_roughness_forces_in_full_contact_is_the_motion_that_lasts(seed: int) -> None:
-    """By a run from the closed-form start until the shoe's own part has gone."""
-    rng = np.random.default_rng(seed)
-    waves = {"amplitudes": [1e-6, 0.7e-6], "wavelengths": [0.031, rng.uniform(0.01, 0.06)]}
-    tables = SQUEAL | {"roughness": {"wheel": waves}}
-    changes = {"friction__coefficient": rng.uniform(0.1, 0.4), "wheel__angular_speed": rng.uniform(2.0, 6.0)}
-    case = make(tables, **changes, link1__damping=3000.0, link2__damping=3000.0, solver__duration=0.6)
-    result = simulate(case)
-    verdict = verdict_of(case)
-    last = result.x[len(result.x) // 2 :]
-    assert (verdict.regime, verdict.excitation, verdict.settled) == (Regime.DAMPED, Excitation.FORCED, True)
-    # The record ends within a turn of the beat of two waves; the shoe's motion acts on the phase of a wave by the
-    # slope 2π g/λ = 2e-4 times 30.
-    assert verdict.amplitude_forced == pytest.approx(0.5 * float(np.ptp(last)), rel=0.03)
-
-
-@pytest.mark.parametrize("waves", [2, 5, 7, 10])
-def test_the_amplitude_of_many_waves_is_that_of_their_highest_meeting(waves: int) -> None:
-    """Their sum is taken at sixteen times in each period of the fastest, over 64 times the run."""
-    rng = np.random.default_rng(waves)
-    lengths = rng.uniform(0.02, 0.04, waves)
-    heights = rng.uniform(1e-7, 1e-6, waves)
-    rough = {"wheel": {"wavelengths": lengths.tolist(), "amplitudes": heights.tolist()}}
-    changes: dict[str, Any] = {"wheel__angular_speed": 10.0, "solver__duration": 4.0}
-    system = system_of(make(SQUEAL | {"roughness": rough}, **changes))
-    theory = linear_theory(system, system.belt_speed)
-    assert theory is not None
-    turns = 2j * np.pi * theory.passing
-    step = 1.0 / (16.0 * np.abs(theory.passing).max())
-    block = theory.waves[:, :1] * np.exp(np.outer(turns, step * np.arange(1 << 14)))
-    starts = np.arange(0.0, 64.0 * 4.0, step * (1 << 14))
-    bounds = [(x.min(), x.max()) for x in (np.imag(np.exp(turns * start) @ block) for start in starts)]
-    swing = 0.5 * (max(high for _, high in bounds) - min(low for low, _ in bounds))
-    assert parts([theory], np.zeros((1, 2)), np.array([0.0, 4.0]))[0] == pytest.approx(swing, rel=0.01)
 
 
 @pytest.mark.parametrize("duration", [0.003, 0.05, 1.0])
@@ -270,7 +214,7 @@ def test_a_forced_swing_is_one_within_its_time(duration: float) -> None:
     assert swing == pytest.approx(0.5 * np.ptp(x), rel=6e-3)
 
 
-@pytest.mark.parametrize("shoes", counts(6, 100))
+@pytest.mark.parametrize("shoes", counts(6, 30))
 def test_without_friction_nothing_is_self_excited(shoes: int) -> None:
     rng = np.random.default_rng(3)
     for _ in range(shoes):
@@ -282,26 +226,6 @@ def test_without_friction_nothing_is_self_excited(shoes: int) -> None:
         verdict = verdict_of(case)
         assert verdict.excitation is not Excitation.SELF_EXCITED, verdict.reasons
         assert verdict.regime in (Regime.DAMPED, Regime.UNDECIDED)
-
-
-def test_numbers_of_a_lasting_motion_are_medians_without_its_transient() -> None:
-    time = INTERVAL * np.arange(20000)
-    vx = 1e-2 * (1.0 + 0.04 * np.exp(-4.0 * time)) * np.sin(2 * np.pi * 170.0 * time)
-    state = np.where(vx > 0.0099, 0.0, -1.0)
-    motion = history_of(len(vx), vx=vx, x=np.cumsum(vx) * INTERVAL, state=state, friction_force=vx)
-    verdict = lasting(motion, Context(1e-2, growth=lambda: 10.0))
-    assert verdict.regime is Regime.RELAXATION
-    # The transient has fallen to less than e^-4 of 4 % by the middle of the settled part.
-    assert verdict.amplitude == pytest.approx(1e-2 / (2 * np.pi * 170.0), rel=2e-3)
-    assert verdict.frequency == pytest.approx(170.0, rel=1e-4)
-    assert verdict.amplitude_spread is not None
-    assert 0.0 < verdict.amplitude_spread < 0.03 * verdict.amplitude
-
-
-def test_a_stop_is_not_called_settled() -> None:
-    changes: dict[str, Any] = {"wheel__angular_speed": None, "wheel__times": [0.0, 0.5]}
-    verdict = verdict_of(make(SQUEAL, **changes, wheel__angular_speeds=[1.0, 0.0], solver__duration=0.3))
-    assert (verdict.regime, verdict.settled) == (Regime.UNDECIDED, False)
 
 
 def test_a_failed_run_is_neither_forced_nor_settled() -> None:
@@ -318,13 +242,6 @@ def test_what_waves_force_whose_phase_x_shifts_is_taken_from_the_history() -> No
     assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
     assert verdict.amplitude_spread is not None
     assert abs(verdict.amplitude - 5.090e-6) <= verdict.amplitude_spread < 3e-7  # by another integrator
-
-
-def test_the_torque_of_a_pad_that_opens_waits_for_the_force() -> None:
-    """By another integrator 377.24 N m lasts; y rings where x has settled, and the whole settled part has 467."""
-    verdict = verdict_of(parse_case(tomli_w.dumps(SHOES["force that rings longer than x"]), "case").case)
-    assert (verdict.excitation, verdict.settled) == (Excitation.FORCED, True)
-    assert verdict.torque_variation == pytest.approx(377.24, rel=verdict.thresholds.settled_within)
 
 
 @pytest.mark.parametrize("omega", [0.1, 2.0])

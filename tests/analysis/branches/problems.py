@@ -110,19 +110,6 @@ def delayed_logistic(x: Array, r: float) -> tuple[Array, Array, Array]:
     )
 
 
-def henon(b: float) -> Step:
-    """(x, y) -> (1 - a x² + y, b x)."""
-
-    def step(x: Array, a: float) -> tuple[Array, Array, Array]:
-        return (
-            np.array([1.0 - a * x[0] ** 2 + x[1], b * x[0]]),
-            np.array([[-2.0 * a * x[0], 1.0], [b, 0.0]]),
-            np.array([-(x[0] ** 2), 0.0]),
-        )
-
-    return step
-
-
 class Given(Problem):
     """The motion u = 0 with maps that are given as functions of the parameter.
 

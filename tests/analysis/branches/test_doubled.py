@@ -12,8 +12,6 @@ from brakecli.analysis.branches.line import Line
 from brakecli.case.case import Case
 from brakecli.solver.phases import BACKWARD, FORWARD, OPEN, STICK
 from brakecli.studies.runs.branch import branch
-from tests.analysis.branches.phasewise import Phasewise
-from tests.analysis.shoes import Shoe
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -70,36 +68,6 @@ def test_a_branch_that_is_cut_is_named() -> None:
     line = Line(Case.model_validate(TABLES), ["friction.coefficient"], 0.0, 1.0)
     cut = Answers(Explorer(line, lambda *_: None, points=30).explore(), line.own)
     assert "; branch 1 is cut at 0." in cut.sentence
-
-
-def test_where_a_cycle_is_unstable_differences_of_another_scheme_grow() -> None:
-    """The cycle loses its stability as it begins to stick, by a jump of multipliers, and regains it at a torus.
-
-    Of the four multipliers by central differences the one nearest to 1 belongs to the direction of the flow.
-    """
-    cycle = answers_of(TABLES | LEAVES, 1.2).branches[1]
-    ((low, high),) = cycle.unstable()
-    torus, stick = (
-        next(mark.motion.value for mark in cycle.special if kind in mark.kind) for kind in ("torus", "stick")
-    )
-    assert (low, high) == pytest.approx((stick, torus), abs=1e-5)
-    assert cycle.branch is not None
-    for row, point in zip(cycle.points[1:], cycle.branch.points[1:], strict=True):
-        value = row.motion.value
-        if not low - 0.05 < value < high + 0.05 or min(abs(value - low), abs(value - high)) < 2e-3:
-            continue
-        motion = Phasewise(Shoe.of(TABLES | LEAVES | {"friction": {"coefficient": value}}))
-        facts: Any = point.facts
-        start = np.array(facts.state)
-        whole = motion(start, facts.period)
-        scales = whole.high - whole.low
-        by_state = np.empty((4, 4))
-        for k, step in enumerate(1e-6 * np.diag(scales)):
-            ends = [motion(start + way * step, facts.period).end for way in (1.0, -1.0)]
-            by_state[:, k] = (ends[0] - ends[1]) / (2e-6 * scales)
-        multipliers = np.linalg.eigvals(by_state)
-        others = np.delete(multipliers, np.argmin(np.abs(multipliers - 1.0)))
-        assert bool(np.abs(others).max() > 1.0) is (low < value < high)
 
 
 def test_straight_lines_between_the_motions_of_a_file_miss_little() -> None:

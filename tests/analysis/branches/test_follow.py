@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.branches.follow import both_ways, follow
-from brakecli.analysis.branches.newton import Newton, Settings, start
+from brakecli.analysis.branches.newton import Settings, start
 from brakecli.analysis.branches.point import Branch, Point
 from brakecli.analysis.branches.problem import Array, Evaluation, Problem
 from tests.analysis.branches.problems import Roots, Scaled
@@ -76,18 +76,6 @@ def test_ends_of_the_range_are_exact() -> None:
     assert s[-1] - s[0] == pytest.approx(length, rel=1e-4)
 
 
-def test_sign_chooses_the_direction() -> None:
-    problem = parabola(0.3)
-    first = first_of(problem, [0.5], 0.55)
-    up = follow(problem, first, 1.0)
-    down = follow(problem, first, -1.0)
-    assert kinds(up) == ["end"]
-    assert kinds(down) == ["fold", "end"]
-    assert up.points[1].p > first.p > down.points[1].p
-    assert [point.s for point in down.points] == sorted(point.s for point in down.points)
-    assert follow(problem, first.turned(), None).points[1].p < first.p
-
-
 @pytest.mark.parametrize(("fold", "ends"), [(1.0001, 1), (0.9999, 2)])
 def test_a_branch_that_turns_just_beyond_the_range_ends_at_the_range(fold: float, ends: int) -> None:
     problem = parabola(fold, -1.0)
@@ -133,15 +121,6 @@ def test_a_helix_that_passes_its_start_is_not_closed(pitch: float) -> None:
     assert branch.points[-1].u[1] > 1.5 * pitch
 
 
-def test_a_figure_eight_is_closed_after_both_loops() -> None:
-    a = 0.3
-    problem = lemniscate(a)
-    branch = follow(problem, first_of(problem, [0.004], 0.504))
-    assert branch.ended[1].kind == "closed"
-    assert branch.points[-1].s == pytest.approx(5.24411510858 * a, rel=1e-3)
-    assert kinds(branch).count("branch point") == 2
-
-
 def test_a_figure_eight_begun_in_its_middle_is_not_closed_where_it_crosses_itself() -> None:
     # begun at the crossing itself, the branch comes back to the same place in another direction
     problem = lemniscate(0.3)
@@ -183,26 +162,6 @@ def test_a_border_is_passed_where_the_branch_bends_or_turns(
     assert abs(grazing.p - 0.5) <= grazing.error <= 2e-6
     assert branch.points[-1].p == ends
     assert branch.points[-1].u[0] == pytest.approx((ends - 0.5) / (1.0 - right), rel=1e-9)
-
-
-def test_the_derivative_by_the_parameter_is_that_of_the_new_word() -> None:
-    # u = p - 0.5 below the border and u = 3 (p - 0.5) above it: only the derivative by p changes
-    problem = Roots(
-        lambda u, p: [u[0] - (3.0 if p > 0.5 else 1.0) * (p - 0.5)],
-        lambda u, p: [[1.0]],
-        lambda u, p: [-3.0 if p > 0.5 else -1.0],
-        word=lambda u, p: p > 0.5,
-    )
-    branch = follow(problem, first_of(problem, [-0.25], 0.25), 1.0)
-    assert kinds(branch) == ["grazing", "end"]
-    for point in branch.points:
-        slope = 3.0 if point.p > 0.5 else 1.0
-        assert point.tangent[0] == pytest.approx(slope * point.tangent[1], rel=1e-9)
-    # from a guess below the border to the point above it at u = 0.05
-    across = np.array([1.0, 0.0])
-    found = Newton(problem, Settings()).solve(np.array([0.05, 0.49]), across, across, 0.0)
-    assert found is not None
-    assert found.p == pytest.approx(0.5 + 0.05 / 3.0, abs=1e-12)
 
 
 def test_a_branch_that_jumps_is_lost_at_the_border() -> None:
@@ -252,15 +211,3 @@ def test_a_reason_of_the_caller_stops_the_branch() -> None:
     branch = follow(problem, first, 1.0, until=lambda point: "too large" if point.u[0] > 0.5 else None)
     assert branch.ended[1] == ("stopped", "too large")
     assert branch.points[-1].u[0] > 0.5 >= branch.points[-2].u[0]
-
-
-def test_few_evaluations_are_spent() -> None:
-    line = Roots(
-        lambda u, p: [u[0] - math.sin(9.0 * p)], lambda u, p: [[1.0]], lambda u, p: [-9.0 * math.cos(9.0 * p)]
-    )
-    first = first_of(line, [0.0], 0.0)
-    line.calls = line.with_parameter = 0
-    branch = follow(line, first)
-    assert len(branch.points) > 80
-    assert branch.evaluations == line.calls <= 2.2 * len(branch.points)
-    assert line.with_parameter <= 1.2 * len(branch.points)

@@ -1,15 +1,11 @@
 """Forced motions of rough pads, and cycles of rough shoes, against the event-driven scheme and closed forms."""
 
-import cmath
 import math
 from collections.abc import Iterator
-from dataclasses import replace
-from itertools import islice
 from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from brakecli.analysis.branches.follow import both_ways, follow
 from brakecli.analysis.branches.forced import Forced
@@ -24,15 +20,12 @@ from brakecli.case.case import Case
 from brakecli.errors import CaseError
 from brakecli.solver.phases import BACKWARD, FORWARD, STICK
 from brakecli.solver.system import System
-from brakecli.studies.sweeps.critical import search
-from brakecli.studies.sweeps.tables import Critical
-from tests.analysis.shoes import Shoe, random_shoes
+from tests.analysis.shoes import Shoe
 from tests.campaign import campaign, counts
 from tests.examples import SQUEAL, make
 from tests.solver.test_rough_flow import event_driven, scales
 from tests.studies.sweeps.shoes import drawn
 
-Array = NDArray[np.float64]
 Tables = dict[str, Any]
 FRICTION = "friction.coefficient"
 DOUBLES = 9001
@@ -69,7 +62,7 @@ def begun(problem: Forced) -> Point:
     return point
 
 
-@pytest.mark.parametrize("many", counts(3, 25))
+@pytest.mark.parametrize("many", counts(3, 10))
 def test_motions_close_and_disturbances_grow_as_in_the_event_driven_scheme(many: int) -> None:
     """Runs of that scheme end where they begin, and their differences have the same multipliers.
 
@@ -108,62 +101,6 @@ def test_motions_close_and_disturbances_grow_as_in_the_event_driven_scheme(many:
     assert unstable
 
 
-def linear(phi: float) -> tuple[Tables, Shoe]:
-    """A shoe in full contact on a wheel with one wave, so low that the motion is linear in it."""
-    tables: Tables = {name: dict(table) for name, table in SQUEAL.items()}
-    tables["friction"] = {"coefficient": phi}
-    tables["wheel"] = {"radius": 0.5, "angular_speed": 2.0}
-    tables["roughness"] = {"wheel": {"amplitudes": [1e-10], "wavelengths": [0.017], "phases_deg": [30.0]}}
-    return tables, Shoe.of(tables)
-
-
-@pytest.mark.parametrize("phi", [0.1, 0.7])
-def test_a_low_wave_forces_the_linear_response_and_its_multipliers_are_those_of_the_modes(phi: float) -> None:
-    """The wave is 2e-7 of the depth and turns by 4e-8 rad where the shoe moves by it, so its force is linear.
-
-    Sines and exponentials of the steps are exact to 1e-6.
-    """
-    tables, shoe = linear(phi)
-    line = Line(Case.model_validate(tables), [FRICTION], 0.0, 2.0 * phi)
-    problem = Forced.along(line, per_period=60.0)
-    point = problem.grow(0.5)
-    assert point is not None
-    period = 0.017 / shoe.belt
-    expected = np.exp(shoe.modes * period)
-    assert point.facts.period == pytest.approx(period, rel=1e-14)
-    np.testing.assert_allclose(np.sort(np.abs(point.multipliers)), np.sort(np.abs(expected)), rtol=1e-5)
-    assert point.stable == (shoe.rate < 0.0)
-    omega = 2.0 * math.pi / 0.017
-    half = tables["contact"]["half_length"]
-    turning = omega * shoe.belt
-    x = float(shoe.rest[0])
-    height = 1e-10 * math.sin(omega * half) / (omega * half) * cmath.exp(1j * (omega * x + math.radians(30.0)))
-    force = shoe.k * np.array([shoe.phi, 1.0]) * height  # times exp(-i turning t); the imaginary part counts
-    response = np.linalg.solve(shoe.stiffness - 1j * turning * shoe.b - shoe.m * turning**2 * np.eye(2), force)
-    assert point.facts.amplitude == pytest.approx(abs(response[0]), rel=1e-4)
-    state = np.concatenate([shoe.rest + response.imag, (-1j * turning * response).imag])
-    size = np.abs(response).max() * np.array([1.0, 1.0, turning, turning])
-    np.testing.assert_allclose((np.array(point.facts.state) - state) / size, 0.0, atol=1e-4)
-    assert point.facts.contact_loss_fraction == 0.0
-
-
-@pytest.mark.parametrize("many", counts(0, 10))
-def test_the_critical_value_of_the_search_is_an_end_of_stability(many: int) -> None:
-    """To its tolerance and error bar. Windows narrower than its tolerance are not found by the search."""
-    seeds = (seed for seed in range(9000, 9100) if line_of(seed)[1].keys == (FRICTION,))
-    for seed in islice(seeds, many):
-        tables, line = line_of(seed)
-        problem = Forced.along(line)
-        branch = both_ways(problem, begun(problem), Settings(seconds=math.inf))
-        ends = [each.p for each in branch.specials if each.kind in ("torus", "flip", "fold")]
-        step = Critical(parameter=FRICTION, lower=line.low, upper=line.high, tolerance=1e-3 * line.high)
-        found = search(step, Line(make(tables), [FRICTION], line.low, line.high))
-        if found.upper is not None and branch.points[0].stable:
-            away = [abs(line.value(p) - found.windows[0][0]) for p in ends]
-            assert min(away) < 3e-3 * line.high + found.window_errors[0][0], seed
-            assert all(point.stable for point in branch.points if point.p < 0.9 * min(ends))
-
-
 def test_the_motion_of_twice_the_period_is_that_of_a_run() -> None:
     """Between two flips the motion of the single period is unstable."""
     _, line = line_of(DOUBLES)
@@ -197,28 +134,6 @@ def test_a_run_settles_on_the_motion_that_has_grown() -> None:
     assert run is not None
     assert run[0].periods == 1
     np.testing.assert_allclose(run[1].u, grown.u, atol=1e-6)
-
-
-def test_more_segments_change_nothing() -> None:
-    """The steps are as long, so the flow is the same but for rounding."""
-    _, line = line_of(DOUBLES)
-    whole = Forced.along(line)
-    frame = whole.frame
-    parts = Forced(line.system, replace(frame, segments=4, steps=frame.steps // 4))
-    whole = Forced(line.system, replace(frame, steps=frame.steps // 4 * 4))
-    one = whole.grow(0.4)
-    other = parts.grow(0.4)
-    assert one is not None
-    assert other is not None
-    np.testing.assert_allclose(other.u[:4], one.u, atol=1e-8)
-    np.testing.assert_allclose(np.abs(other.multipliers), np.abs(one.multipliers), rtol=1e-5)
-    seen = parts.evaluate(other.u, 0.4, with_parameter=True)
-    assert not isinstance(seen, str)
-    assert seen is not None
-    for k in range(len(other.u)):
-        beside = [parts.evaluate(other.u + step * np.eye(len(other.u))[k], 0.4, False) for step in (1e-6, -1e-6)]
-        gaps = [each.gap for each in beside if each is not None and not isinstance(each, str)]
-        np.testing.assert_allclose((gaps[0] - gaps[1]) / 2e-6, seen.by_u[:, k], atol=1e-5)
 
 
 def test_a_branch_passes_borders_of_stick() -> None:
@@ -280,25 +195,6 @@ def test_changing_speed_and_invalid_ranges_are_refused() -> None:
     tables["load"] = {"times": [0.0, 1.0], "forces": [1000.0, 1100.0]}
     with pytest.raises(CaseError, match="changes in time"):
         Forced.along(Line(Case.model_validate(tables), [FRICTION], 0.0, 1.0))
-
-
-@campaign
-def test_random_open_pads_end_for_a_reason() -> None:
-    """A branch goes through or says why it ends, and its motions close, also where pads lift off."""
-    for tables in islice(random_shoes("open", 3), 12):
-        line = Line(Case.model_validate(tables), [FRICTION], 0.0, 2.0 * (Shoe.of(tables).critical or 0.5))
-        try:
-            problem = Forced.along(line)
-        except CaseError:
-            continue
-        point = problem.grow(0.0, Settings(low=1e-3, first=0.05, longest=1.0, change=math.inf, seconds=math.inf))
-        if point is None:
-            continue
-        branch = follow(problem, point, 1.0, Settings(seconds=math.inf))
-        assert branch.ended[1].reason
-        for each in some(branch, 2):
-            if stretch(each) < 10.0:
-                assert gap(line.system(each.p), each.facts.state, each.facts.period) < 1e-3 * stretch(each)
 
 
 # --- rough shoes on smooth wheels -----------------------------------------------------------------------------

@@ -19,19 +19,6 @@ pytestmark = pytest.mark.usefixtures("compiled")
 # frequencies meet at √2 where 4/3 φ = 1.
 
 
-def test_the_minimal_model_of_mode_coupling_flutters_at_its_closed_form() -> None:
-    """φ = 0.75, where both frequencies are √2 rad/s.
-
-    The test of flutter of a shoe without dashpots is the discriminant, which has a simple zero there.
-    """
-    sliding = Sliding(Line(make(MODE_COUPLING), [FRICTION], 0.0, 2.0))
-    (change,) = sliding.changes(sliding.along())
-    assert change.kind == "flutter"
-    assert change.lost
-    assert 2.0 * change.p == pytest.approx(0.75, abs=1e-12)
-    assert 2.0 * math.pi * change.frequency == pytest.approx(math.sqrt(2.0), rel=1e-6)
-
-
 def test_the_minimal_model_of_mode_coupling_grows_as_its_closed_form_beyond_it() -> None:
     """At φ = 1 w = 2 ± i √(1/3), and the growth rate is the imaginary part of its root."""
     slide = Sliding(Line(make(MODE_COUPLING), [FRICTION], 0.0, 2.0)).at(0.5)

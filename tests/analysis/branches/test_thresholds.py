@@ -1,6 +1,5 @@
 """Both thresholds of friction, as `stability` and `advise` name them: against branches, and against runs."""
 
-import math
 from typing import Any
 
 import pytest
@@ -10,9 +9,7 @@ from brakecli.analysis.branches.explore import Explorer
 from brakecli.analysis.branches.line import Line
 from brakecli.analysis.branches.thresholds import FRICTION, Thresholds, thresholds
 from brakecli.analysis.stability.report import stability
-from brakecli.case.read import LoadedCase
 from brakecli.case.system import system_of
-from brakecli.studies.runs.branch import branch, line_of
 from brakecli.studies.sweeps.point import next_start
 from brakecli.studies.sweeps.simulate import PointRun, simulate
 from tests.analysis.branches.smooth_shoes import changed, numbered
@@ -46,32 +43,6 @@ def motion(tables: Tables, friction: float, frequency: float, start: dict[str, A
     return simulate(
         make({**changed(tables, FRICTION, friction), "initial": start, "solver": solver, "output": sampled})
     )
-
-
-@pytest.mark.parametrize("number", [SUBCRITICAL, *MORE[-2:], SUPERCRITICAL])
-@campaign
-def test_they_are_those_of_the_branch_command_over_another_range(number: int) -> None:
-    """To the bars of the special points, which are 1e-10 and less of the range."""
-    tables = shoe(number)
-    critical = stability(system_of(make(tables))).critical
-    assert critical is not None
-    # at a friction between both thresholds there is a barrier
-    least = found_of(tables).coexists_from
-    own = 0.5 * (least + critical.friction) if least is not None else critical.friction
-    case = make(changed(tables, FRICTION, own))
-    line = line_of(LoadedCase(case, "", ""), [FRICTION], 0.01 * own, 1.7 * critical.friction, "range")
-    whole = branch(Explorer(line, lambda what, done, total: None))
-    found = found_of(changed(tables, FRICTION, own))
-    assert found.critical == pytest.approx(whole.critical, rel=1e-9)
-    assert (found.coexists_from is None) == (found.barrier is None) == (number == SUPERCRITICAL)
-    pairs = ((found.coexists_from, whole.coexists_from), (found.barrier, whole.barrier))
-    assert all(a == b or math.isclose(a or 0.0, b or 0.0, rel_tol=1e-8) for a, b in pairs)
-    below = (
-        f"a vibration can exist from {found.coexists_from:.4g} on" if found.coexists_from else "not exist below"
-    )
-    assert below in str(found.sentence)
-    assert f"sliding loses stability at {critical.friction:.4g}; " in str(found.sentence)
-    assert ("lies between the two" in str(found.sentence)) == (number != SUPERCRITICAL)
 
 
 @pytest.mark.parametrize("number", [SUBCRITICAL, *(pytest.param(each, marks=campaign) for each in MORE)])
