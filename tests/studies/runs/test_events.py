@@ -22,7 +22,6 @@ from brakecli.studies.runs.limits import adjustments
 from brakecli.studies.runs.run import RunReport, run
 from tests.campaign import campaign
 from tests.examples import COULOMB, SQUEAL
-from tests.solver.test_track import BOUNCING
 
 pytestmark = pytest.mark.usefixtures("compiled")
 EVENTS = {"output": {"sample_interval": 1e-4, "events": True}}
@@ -87,44 +86,6 @@ def test_flight_begins_with_a_lift_off_and_ends_with_a_touch(tmp_path: Path) -> 
     assert ((flights.vy > 0.0) == (flights.kind == "lift-off")).all()
 
 
-@campaign
-def test_a_rough_pad_lifts_off_and_touches_on_its_motion(tmp_path: Path) -> None:
-    """A straight line between samples misses a velocity by no more than it changes between them."""
-    output = {"sample_interval": 1e-5, "events": True}
-    solver = {"scheme": "event-driven", "duration": 0.02, "tolerance": 1e-8}
-    case = {**BOUNCING, "contact": {"half_length": 0.05, "stiffness": 5e7}, "output": output, "solver": solver}
-    written(tmp_path / "a.h5", case)
-    found = events(tmp_path / "a.h5")
-    flights = found.kind.isin(["lift-off", "touch"]).values
-    assert flights.sum() > 6
-    for place, speed in (("x", "vx"), ("y", "vy")):
-        with open_result(tmp_path / "a.h5") as result:
-            change = float(np.abs(np.diff(result.read("history", speed))).max())
-        for name, within in ((place, 1e-5 * change), (speed, change)):
-            gaps = np.abs(found[name].values - interpolated(tmp_path / "a.h5", name, found.time.values))
-            assert gaps[flights].max() < within < 0.1 * float(np.ptp(found[name].values)), name
-    with open_result(tmp_path / "a.h5") as result:
-        touching = np.concatenate([[0], np.diff(result.read("history", "normal_force") > 0.0)]).sum()
-    assert flights.sum() == pytest.approx(touching, abs=0.1 * touching)  # a flight between two samples
-
-
-@campaign
-def test_only_the_last_events_are_kept_and_that_is_said(tmp_path: Path) -> None:
-    """Two turning points of x for each two turns of the sliding, beside a wheel that hardly moves it."""
-    case = {**RUBS, "friction": {"coefficient": 1e-6}, "wheel": {"radius": 1.0, "angular_speed": 1e-3}}
-    report = written(
-        tmp_path / "a.h5", case, "solver.duration=7e4", "output.sample_interval=10.0", "initial.x=1e3"
-    )
-    found = events(tmp_path / "a.h5")
-    earlier = found.attrs["earlier"]
-    assert len(found.time) == MOST_EVENTS // 2
-    assert len(found.time) + earlier == pytest.approx(7e4 / math.pi, abs=2)
-    assert (
-        f"output.events: the last {len(found.time)} events are in the file, {earlier} earlier"
-        in report.warnings[-1]
-    )
-
-
 def test_schemes_that_do_not_locate_events_are_refused() -> None:
     case = tomli_w.dumps({**SQUEAL, **EVENTS})
     with pytest.raises(CaseError) as caught:
@@ -163,3 +124,20 @@ def test_a_start_beside_steady_sliding_is_said() -> None:
     near = {**SQUEAL, "initial": {"at": "equilibrium", "x": 1e-6}}
     (said,) = adjustments(system_of(parse_case(tomli_w.dumps(near), "case.toml").case))
     assert said == "initial: x = 1e-06 m and y = 0 m are added to the position of steady sliding"
+
+
+@campaign
+def test_only_the_last_events_are_kept_and_that_is_said(tmp_path: Path) -> None:
+    """Two turning points of x for each two turns of the sliding, beside a wheel that hardly moves it."""
+    case = {**RUBS, "friction": {"coefficient": 1e-6}, "wheel": {"radius": 1.0, "angular_speed": 1e-3}}
+    report = written(
+        tmp_path / "a.h5", case, "solver.duration=7e4", "output.sample_interval=10.0", "initial.x=1e3"
+    )
+    found = events(tmp_path / "a.h5")
+    earlier = found.attrs["earlier"]
+    assert len(found.time) == MOST_EVENTS // 2
+    assert len(found.time) + earlier == pytest.approx(7e4 / math.pi, abs=2)
+    assert (
+        f"output.events: the last {len(found.time)} events are in the file, {earlier} earlier"
+        in report.warnings[-1]
+    )

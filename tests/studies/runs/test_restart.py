@@ -69,30 +69,8 @@ def test_two_runs_are_as_one(case: dict[str, Any], bound: float, tmp_path: Path)
     assert apart(case, tmp_path) < bound
 
 
-@campaign
-def test_a_three_layer_scheme_misses_by_the_third_power_of_its_step(tmp_path: Path) -> None:
-    """The file has one level of two; the other is that of the consistent start, whose error is h⁴, in vx h³."""
-    steps = ("solver.step=1e-5", "solver.step=5e-6")
-    coarse, fine = (apart(ROUGH, tmp_path, "", 'solver.scheme="three-layer"', step) for step in steps)
-    assert coarse < 1e-5
-    assert coarse / fine == pytest.approx(8.0, rel=0.3)
-
-
 def test_without_the_angle_of_the_wheel_the_waves_begin_anew(tmp_path: Path) -> None:
     assert apart(ROUGH, tmp_path, "initial={{x={x}, y={y}, vx={vx}, vy={vy}}}") > 0.05
-
-
-@campaign
-def test_the_angle_is_that_of_all_runs_before_whatever_the_speed(tmp_path: Path) -> None:
-    """ω falls from 4 to 0.4 rad/s in 10 ms: 22 mrad, then 4 mrad; and the schedule begins anew with each run."""
-    wheel = "wheel={radius=0.5, times=[0.0, 0.01], angular_speeds=[4.0, 0.4]}"
-    first = motion(tmp_path / "a.h5", ROUGH, wheel)
-    assert end_of(tmp_path / "a.h5") == {
-        **{name: first[name][-1] for name in MOTION[:4]},
-        "wheel_angle": pytest.approx(0.026, rel=1e-14),
-    }
-    motion(tmp_path / "b.h5", ROUGH, wheel, f'initial.from="{tmp_path / "a.h5"}"')
-    assert end_of(tmp_path / "b.h5")["wheel_angle"] == pytest.approx(0.052, rel=1e-14)
 
 
 def test_the_resolved_case_repeats_the_run_without_the_file(tmp_path: Path) -> None:

@@ -1,8 +1,6 @@
 """A run that is long enough by itself ends where its verdict is decided; a case with that duration repeats it."""
 
 import math
-import re
-import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,7 +20,6 @@ from brakecli.results.read import open_result
 from brakecli.solver.integrate import Motion
 from brakecli.solver.quantities import Failure
 from brakecli.solver.system import System
-from brakecli.studies.runs.advise import advise
 from brakecli.studies.runs.judge import motion_of, to_judge, verdict_in_memory
 from brakecli.studies.runs.limits import check
 from brakecli.studies.runs.settled import MOST_SAMPLES, Judged, Settled, longest, settle
@@ -30,7 +27,7 @@ from brakecli.studies.sweeps.plan import parse_sweep
 from brakecli.studies.sweeps.workers.task import compute_units
 from tests.analysis.test_verdicts import RINGS
 from tests.campaign import campaign
-from tests.commands import TINY, attributes, brakecli
+from tests.commands import TINY, brakecli
 from tests.examples import ROUGH, SQUEAL, make
 from tests.studies.sweeps.helpers import axis, inline, write_sweep
 from tests.studies.sweeps.made_up import CYCLE, SPEEDS, made_of
@@ -105,11 +102,6 @@ def test_a_run_goes_on_while_the_friction_force_rings_beside_a_settled_x() -> No
     assert half.torque_variation is None
 
 
-def test_runs_are_twice_as_long_each_time_until_one_is_decided() -> None:
-    assert made_up(8.0) == [2.0, 4.0, 8.0]
-    assert made_up(2.0) == [2.0]
-
-
 def test_a_run_that_fails_is_not_made_longer() -> None:
     assert made_up(8.0, failure=Failure.DIVERGED) == [2.0]
 
@@ -163,42 +155,6 @@ def test_a_budget_of_steps_ends_what_is_not_decided_and_counts_all_runs() -> Non
     assert tried == [2.0, 4.0, 8.0, 16.0]
 
 
-def test_what_does_not_settle_says_which_limit_it_has_met_and_what_would_help() -> None:
-    system = to_judge(system_of(make(EXACT)))
-    judged = judge(replace(system, duration=0.05))
-    open_ = judged._replace(verdict=replace(judged.verdict, decision=UNDECIDED))
-    (warning,) = settle(replace(system, budget=MOST_BUDGET), lambda part: open_).warnings
-    assert f"no more than {MOST_SAMPLES:,} samples are tried; " in warning
-    assert warning.endswith("an output.sample_interval above 0.0001 s lets it be longer")
-
-
-def test_a_measured_profile_gives_up_at_its_budget_and_goes_on_with_the_one_that_is_advised(
-    tmp_path: Path,
-) -> None:
-    """A turn of the wheel in steps of a degree: eccentric, of three waves, and with noise of a micrometre."""
-    angle = np.radians(np.arange(360.0))
-    chance = np.random.default_rng(7)
-    height = 20.0 * np.sin(angle) + 8.0 * np.sin(3.0 * angle + 1.0) + chance.standard_normal(360)
-    rows = (f"{place:.6f},{micrometres:.4f}" for place, micrometres in zip(0.5 * angle, height, strict=True))
-    (tmp_path / "runout.csv").write_text("\n".join(["s_m,h_um", *rows]) + "\n")
-    text = OPEN.replace("step = 1e-5, ", "").replace("angular_speed = 0.1", "angular_speed = 4.0")
-    text = text.replace("output.sample_interval = 1e-4", f'roughness.wheel.profile = "{tmp_path}/runout.csv"')
-
-    def with_budget(steps: int) -> Settled[Motion]:
-        return settle_case(parse_case(text, "case", ["friction.coefficient=0.3", f"solver.budget={steps}"]).case)
-
-    first = with_budget(1)
-    (warning,) = first.warnings
-    assert first.judged.verdict.unfinished
-    advised = re.search(r"and ([\d,]+) steps in all; .*; solver\.budget = (\d+) lets it be twice as long", warning)
-    assert advised is not None
-    tried, enough = (int(each.replace(",", "")) for each in advised.groups())
-    assert tried == first.judged.motion.work.all_steps >= first.judged.motion.work.steps
-    second = with_budget(enough)
-    assert second.system.duration == pytest.approx(2.0 * first.system.duration, rel=1e-3)
-    assert len(first.system.wheel.g) > 100
-
-
 DAMPED = Decision("decays", Regime.DAMPED)
 BLANK = Verdict(DAMPED, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, False, {})
 UNDECIDED = Decision("grows", longer=True)
@@ -225,26 +181,6 @@ def test_a_verdict_says_whether_a_longer_run_may_say_more(
     settled_ = changes.get("settled", False)
     others = {key: changes[key] for key in changes if key != "settled"}
     assert replace(BLANK, decision=decision, settled=settled_, **others).unfinished is unfinished
-
-
-@campaign
-def test_the_result_repeats_with_its_duration_as_a_number_to_the_last_bit(tmp_path: Path) -> None:
-    (tmp_path / "open.toml").write_text(OPEN)
-    done = brakecli("run", "open.toml", "--json", cwd=tmp_path)
-    numbers = done.json
-    seconds = tomllib.loads(numbers["resolved_toml"])["solver"]["duration"]
-    done.told(0, f"solver.duration: settled after {seconds:.6g} s")
-    assert 'duration = "settled"' in attributes(tmp_path / "open.h5")["case_toml"]
-    brakecli("run", "open.h5", "-o", "again.h5", "-q", cwd=tmp_path).told(0)
-    brakecli("run", "open.toml", "--set", f"solver.duration={seconds!r}", "-o", "n.h5", "-q", cwd=tmp_path).told(0)
-    histories = []
-    for name in ("open.h5", "again.h5", "n.h5"):
-        with open_result(tmp_path / name, kind="run") as result:
-            histories.append([result.read("history", each, 0, None) for each in ("time", "x", "vx", "state")])
-    for others in histories[1:]:
-        for ours, theirs in zip(histories[0], others, strict=True):
-            np.testing.assert_array_equal(ours, theirs)
-    assert histories[0][0][-1] == pytest.approx(seconds, rel=1e-12)
 
 
 def test_points_of_a_sweep_settle_each_in_its_own_time(tmp_path: Path) -> None:
@@ -288,14 +224,6 @@ def test_check_tells_how_long_a_run_may_become_and_a_number_is_not_touched() -> 
     assert settle(replace(system, budget=0), judge).system.duration == system.duration
 
 
-def test_advice_is_checked_by_a_run_that_settles() -> None:
-    text = TINY.replace("step = 1e-5, duration = 0.02", 'duration = "settled"')
-    report = advise(parse_case(text, "case"), ["link2.angle_deg"], 0.2, lambda what, done, total: None)
-    assert report.check is not None
-    assert report.check.verdict.regime is Regime.DAMPED
-    assert not report.check.verdict.unfinished
-
-
 def test_a_tolerance_is_kept_by_a_run_that_settles() -> None:
     text = starters()["rough"]
     found = settle_case(parse_case(text, "rough").case)
@@ -316,16 +244,6 @@ def test_what_changes_with_time_cannot_settle(tmp_path: Path) -> None:
     assert 'or "settled"' in brakecli("check", "open.toml", "--set", "solver.duration=0", cwd=tmp_path).told(2)
     constant = "load={times=[0.0, 1.0], forces=[5000.0, 5000.0]}"
     brakecli("run", "open.toml", "--set", constant, cwd=tmp_path).told(0)
-
-
-def test_the_limit_is_told_on_the_command_line_with_the_verdict(tmp_path: Path) -> None:
-    """No dashpot: samples so far apart that a million of them are soon computed."""
-    (tmp_path / "open.toml").write_text(OPEN.replace("damping = 300.0", "damping = 0.0"))
-    few = ["--set", "output.sample_interval=1e-3", "--set", "solver.step=1e-3"]
-    done = brakecli("run", "open.toml", *few, "--set", "friction.coefficient=0.3", cwd=tmp_path)
-    told = done.told(0, "warning: solver.duration: not settled after")
-    assert "a longer run would not decide more" in told
-    assert attributes(tmp_path / "open.h5")["regime"] == "undecided"
 
 
 @campaign
@@ -379,3 +297,12 @@ def test_the_pad_of_the_starter_squeals_at_2_khz_as_its_modes_couple() -> None:
     assert found.judged.verdict.frequency == pytest.approx(1950.0, abs=5.0)
     assert found.warnings == ()
     assert parse_case(resolved_toml(case), "again").case.output.sample_interval == case.output.sample_interval
+
+
+def test_what_does_not_settle_says_which_limit_it_has_met_and_what_would_help() -> None:
+    system = to_judge(system_of(make(EXACT)))
+    judged = judge(replace(system, duration=0.05))
+    open_ = judged._replace(verdict=replace(judged.verdict, decision=UNDECIDED))
+    (warning,) = settle(replace(system, budget=MOST_BUDGET), lambda part: open_).warnings
+    assert f"no more than {MOST_SAMPLES:,} samples are tried; " in warning
+    assert warning.endswith("an output.sample_interval above 0.0001 s lets it be longer")

@@ -4,12 +4,11 @@ import math
 
 import numpy as np
 import pytest
-from scipy.linalg import expm
 
 from benchmarks.statistics.cases import KINDS, draw
 from benchmarks.statistics.judging import judge
 from benchmarks.statistics.kernels import contact
-from benchmarks.statistics.reference import QUICK_SHARE, Tables, reference, shoe_of
+from benchmarks.statistics.reference import QUICK_SHARE, Tables, shoe_of
 from tests.campaign import counts
 
 SMOOTH: Tables = {
@@ -28,47 +27,6 @@ WAVES = {
     "shoe": {"amplitudes": [1e-5, 4e-6], "wavelengths": [0.017, 0.0043], "phases_deg": [20.0, 250.0]},
     "wheel": {"amplitudes": [2e-5, 3e-6], "wavelengths": [0.023, 0.0061], "phases_deg": [0.0, 100.0]},
 }
-
-
-@pytest.mark.parametrize("turned", [1.0, -1.0])
-def test_reference_slides_as_the_exponential_of_a_matrix(turned: float) -> None:
-    tables = {**SMOOTH, "wheel": {"radius": 0.5, "angular_speed": 20.0 * turned}}
-    found = reference(tables)
-    shoe = shoe_of(tables)
-    assert found is not None
-    assert found.sticks + found.turns + found.lifts == 0
-    K = 2.0 * shoe.a * shoe.k
-    Q = 5e3
-    stiffness = np.array([[shoe.c_xx, shoe.c_xy + turned * shoe.phi * K], [shoe.c_xy, shoe.c_yy + K]]) / shoe.m
-    damping = np.array([[shoe.b_xx, shoe.b_xy], [shoe.b_xy, shoe.b_yy]]) / shoe.m
-    rest = np.linalg.solve(stiffness, -Q / shoe.m * np.array([shoe.sin_beta, shoe.cos_beta]))
-    matrix = np.block([[np.zeros((2, 2)), np.eye(2)], [-stiffness, -damping]])
-    middle = np.array([*rest, 0.0, 0.0])
-    z = np.array([2e-4, -6e-4, 0.1, 0.0])
-    for n in (1, 250, 1000):
-        exact = middle + expm(matrix * (n * 1e-4)) @ (z - middle)
-        assert (np.abs(found.rows[n] - exact) / found.sizes).max() < 1e-12
-    assert found.own_error() < 1e-11
-
-
-def test_reference_comes_to_rest_as_the_coulomb_oscillator() -> None:
-    tables: Tables = {
-        "shoe": {"mass": 1.0},
-        "wheel": {"radius": 1.0, "angular_speed": 0.0},
-        "link1": {"stiffness": 0.0},
-        "link2": {"stiffness": 1.0},
-        "load": {"force": 1.0},
-        "friction": {"coefficient": 1.0},
-        "contact": {"half_length": 0.5, "stiffness": 1.0},
-        "initial": {"x": 12.0, "vx": 6.0, "y": -1.0},
-        "solver": {"duration": 60.0},
-        "output": {"sample_interval": 0.25},
-    }
-    found = reference(tables)
-    assert found is not None
-    assert found.rows[-1] == pytest.approx([0.6821789367236466, -1.0, 0.0, 0.0], abs=1e-13)
-    assert (found.sticks, found.turns) == (1, 7)  # peaks above 1: -1 + √205 - 2n for n from 0 to 6
-    assert found.sizes[3] == math.inf  # it never moves along y
 
 
 def test_exact_contact_agrees_with_a_fine_sum_and_its_length_with_the_slope() -> None:

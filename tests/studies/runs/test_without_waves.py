@@ -1,6 +1,5 @@
 """What becomes of a motion on the smooth wheel, beside long runs."""
 
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,6 @@ from brakecli.analysis.fate import Fate, Kind, fate_on_smooth_pads
 from brakecli.analysis.shoe import Shoe
 from brakecli.case.system import system_of
 from brakecli.solver.integrate import solve
-from brakecli.solver.phases import STICK
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import System
 from brakecli.studies.runs.without_waves import LONGEST, without_waves
@@ -28,30 +26,6 @@ def continued(shoe: System) -> Fate:
     """From the start of a case."""
     start = shoe.initial
     return without_waves(shoe, np.array([start.x, start.y, start.vx, start.vy]))
-
-
-@pytest.mark.parametrize("roughness", [{}, {"roughness__wheel": WAVES["wheel"]}])
-@pytest.mark.parametrize("omega", [0.1, 2.0])
-def test_a_vibration_comes_to_the_limit_cycle_of_a_long_run(roughness: dict[str, Any], omega: float) -> None:
-    """By stick, and by loss of contact; the waves of the wheel do not matter."""
-    found = continued(system(**roughness, wheel__angular_speed=omega))
-    assert found.kind is Kind.LIMIT_CYCLE
-    orbit = found.orbit
-    assert orbit is not None
-    assert found.rate is not None
-    interval = orbit.period / 100.0
-    changes: dict[str, Any] = {"solver__step": 0.02 * interval, "output__sample_interval": interval}
-    rows = solve(system(wheel__angular_speed=omega, **changes, solver__duration=1.0)).rows[-2000:]
-    assert orbit.amplitude == pytest.approx(0.5 * float(np.ptp(rows[:, 0])), rel=0.01)
-    assert orbit.level == pytest.approx(float(rows[:, 2].std()), rel=0.01)
-    assert orbit.word.count(STICK) == (1 if omega == 0.1 else 0)
-    assert found.rate > 0.0
-
-
-def test_below_the_critical_friction_it_dies_out_from_any_start() -> None:
-    shoe = replace(system(), coefficients=system().coefficients._replace(phi=0.3))
-    for speed in (1e-5, 0.05, 1.0):
-        assert without_waves(shoe, np.array([0.0, 0.0, speed, 0.0])).kind is Kind.STEADY_SLIDING
 
 
 def test_what_comes_near_unstable_sliding_is_not_said_to_last() -> None:

@@ -25,7 +25,7 @@ from brakecli.studies.scattering.answers import Indices, quantiles
 from brakecli.studies.scattering.draw import MOST_SAMPLES, for_indices, sample_values
 from brakecli.studies.scattering.study import SCRAMBLINGS, Parameter, Study
 from tests.campaign import campaign, counts
-from tests.commands import ROOT, TINY, left_in
+from tests.commands import ROOT, left_in
 from tests.commands import brakecli as command
 from tests.examples import NEVER_STABLE, SQUEAL, make
 
@@ -136,18 +136,6 @@ def test_correlations_are_those_of_the_matrix() -> None:
     assert np.corrcoef(values.T) == pytest.approx(np.array(matrix), abs=0.01)  # 1/√16384, and less for Sobol's
 
 
-def test_indices_of_a_linear_margin_are_its_shares() -> None:
-    """Of Σ c x with deviations s, both indices are c² s²/Σ c² s²."""
-    weights = np.array([1.0, 2.0, 0.5])
-    deviations = (1.0, 0.5, 0.1)
-    study = study_of(*({**NORMAL, "deviation": each} for each in deviations), samples=4096)
-    shares = (weights * deviations) ** 2 / ((weights * deviations) ** 2).sum()
-    found = Indices.find("growth_rate", study.names, for_indices(study) @ weights, 0)
-    assert [*found.first_order.values()] == pytest.approx(shares.tolist(), abs=0.01)
-    assert [*found.total.values()] == pytest.approx(shares.tolist(), abs=0.01)
-    assert (abs(np.array([*found.total.values()]) - shares) <= 2.0 * np.array([*found.error.values()])).all()
-
-
 def test_indices_of_the_ishigami_function_are_those_of_its_closed_form() -> None:
     """sin x1 + 7 sin² x2 + 0.1 x3⁴ sin x1; T. Ishigami and T. Homma, ISUMA 1990: the variances of its parts."""
     a = 7.0
@@ -200,8 +188,7 @@ def test_others_are_named_where_the_joint_part_is_beyond_its_error() -> None:
     assert Indices("squeal").sentence == ""
 
 
-@pytest.mark.parametrize("sampling", ["sobol", "latin-hypercube", "random"])
-@pytest.mark.parametrize("margin", [0.5, 2.0])
+@pytest.mark.parametrize(("sampling", "margin"), [("sobol", 2.0), ("latin-hypercube", 0.5), ("random", 2.0)])
 @pytest.mark.parametrize("replications", counts(60, 400))
 def test_intervals_cover_the_truth(sampling: str, margin: float, replications: int) -> None:
     """Of a linear margin under normal scatter, whose probability is Φ(-margin/σ).
@@ -275,16 +262,6 @@ def test_runs_and_eigenvalues_agree_on_a_shoe_that_flutters(tmp_path: Path) -> N
     assert shares[0] == shares[1]
     regimes = {*report.regime.to_numpy().tolist()}
     assert regimes <= {"damped", "relaxation", "quasi-harmonic", "undecided"}
-
-
-@campaign
-def test_a_study_of_runs_goes_on_where_it_was_and_gives_the_same_bytes(tmp_path: Path) -> None:
-    write_study(tmp_path, FRICTION, "samples = 8", 'method = "run"', 'indices_of = "squeal"', case=TINY)
-    command("scatter", "study.toml", "-j", "1", "-q", cwd=tmp_path)
-    whole = (tmp_path / "study.h5").read_bytes()
-    command("scatter", "study.toml", "-j", "2", "-q", "--force", cwd=tmp_path)
-    assert (tmp_path / "study.h5").read_bytes() == whole
-    assert left_in(tmp_path) == {"shoe.toml", "study.toml", "study.h5"}
 
 
 def test_what_is_said_is_what_the_file_holds(tmp_path: Path) -> None:
@@ -406,45 +383,11 @@ def test_a_study_and_its_result_are_loaded_in_python(tmp_path: Path) -> None:
     command("plot", "study.toml", cwd=tmp_path).told(2, "brakecli scatter study.toml")
 
 
-@campaign
-def test_a_drawing_beside_all_samples_is_named(tmp_path: Path) -> None:
-    """A normal distribution keeps 99.73 % within three deviations: 3.5 to 6.5 degrees."""
-    write_study(tmp_path, FRICTION, ANGLE, "samples = 16")
-    for value, said in (
-        ("6.49", ""),
-        ("6.51", "link2.angle_deg: the case has 6.51, but the study scatters it between 3.5 and 6.5"),
-    ):
-        line = [
-            "study.toml",
-            "--set",
-            f"link2.angle_deg={value}",
-            "--set",
-            'indices_of="none"',
-            "--force",
-            "--json",
-        ]
-        notes = json.loads(command("scatter", *line, cwd=tmp_path).out)["notes"]
-        assert notes == ([said] if said else [])
-        line = ["shoe.toml", "--set", f"link2.angle_deg={value}", "--scatter", "study.toml", "--keys", "shoe.mass"]
-        assert (said in command("advise", *line, cwd=tmp_path).err) is True
-        assert ("scatters it between" in command("advise", *line, cwd=tmp_path).err) is bool(said)
-
-
 def test_with_correlations_there_are_no_indices(tmp_path: Path) -> None:
     path = write_study(tmp_path, "samples = 16", "correlation = [[1.0, 0.5], [0.5, 1.0]]", FRICTION, ANGLE)
     report = brakecli.scatter(path)
     assert "parameter" not in report.sizes
     assert "with correlations" in str(report.attrs["notes"])
-
-
-def test_samples_without_an_answer_are_counted_and_named(tmp_path: Path) -> None:
-    """A load that pulls the shoe off the wheel at half of the samples."""
-    load = '[[parameter]]\nkey = "load.force"\ndistribution = "uniform"\nlow = -100.0\nhigh = 100.0\n'
-    path = write_study(tmp_path, load, "samples = 64")
-    with pytest.warns(UserWarning, match="of 64 samples have no answer"):
-        report = brakecli.scatter(path)
-    assert float(report.probability.sel(outcome="failed")) == pytest.approx(0.5, abs=0.02)
-    assert "samples have no" in str(report.attrs["notes"])
 
 
 def test_a_shoe_that_locks_itself_is_unstable_and_past_its_critical_friction(tmp_path: Path) -> None:
@@ -621,11 +564,6 @@ def test_other_files_are_told_from_studies(tmp_path: Path) -> None:
     (tmp_path / "shoe.toml").unlink()
     with pytest.raises(CaseError, match=r"study\.toml:1: case: "):
         load_study(str(path), None)
-
-
-def test_a_single_parameter_decides_alone(tmp_path: Path) -> None:
-    report = brakecli.scatter(write_study(tmp_path, ANGLE, "samples = 16"))
-    assert float(report.first_order[0]) == float(report.total[0]) == 1.0
 
 
 def test_quantiles_are_of_what_is_known() -> None:

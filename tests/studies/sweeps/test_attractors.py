@@ -12,7 +12,6 @@ import tomli_w
 import xarray as xr
 from numpy.typing import NDArray
 
-import brakecli
 from brakecli.case.read import starters
 from brakecli.results.read import open_result
 from brakecli.studies.sweeps.plan import LoadedSweep, parse_sweep
@@ -209,23 +208,3 @@ def test_many_undecided_points_are_told_with_their_most_frequent_reason_and_the_
     assert 'solver.duration = "settled"' in said
     few = swept(tmp_path, [*points[:1], *[DAMPED] * 4]).findings.sentences
     assert not any("points are undecided," in each for each in few)
-
-
-@pytest.mark.usefixtures("compiled")
-@campaign
-def test_a_sweep_in_memory_has_its_attractors_and_is_drawn(tmp_path: Path) -> None:
-    """What a file holds in a group of its own is an attribute there, which a copy keeps."""
-    basin(tmp_path, [0.5])
-    axes: Any = {"initial.vy": [-3e-3, 0.0, 3e-3]}
-    found = brakecli.sweep(tmp_path / "case.toml", axes=axes, output=tmp_path / "s.h5", jobs=1)
-    told = found.brakecli.attractors
-    assert [each.points for each in told] == [int((found.attractor == each.attractor).sum()) for each in told]
-    assert sum(each.points for each in told) == 3
-    assert told == brakecli.load(tmp_path / "s.h5").brakecli.attractors
-    found.brakecli.save(tmp_path / "copy.h5")
-    assert brakecli.load(tmp_path / "copy.h5").brakecli.attractors == told
-    assert "attractor 1" in found.brakecli.table()
-    brakecli.plot(found, output=tmp_path / "a.png")
-    brakecli.plot(tmp_path / "s.h5", output=tmp_path / "b.png")
-    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
-    assert "<h1" in brakecli.report(found)

@@ -3,7 +3,6 @@
 A bar holds the truth if the growth of disturbances changes its sign within it.
 """
 
-import math
 from pathlib import Path
 from typing import Any
 
@@ -11,27 +10,24 @@ import numpy as np
 import pytest
 import tomli_w
 
-from brakecli.analysis.branches.answers import Answers
-from brakecli.analysis.branches.explore import crossing
 from brakecli.analysis.branches.line import Line
 from brakecli.studies.sweeps.critical import search
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search
-from brakecli.studies.sweeps.windows_of_branch import explored
 from tests.campaign import campaign
 from tests.commands import brakecli
 from tests.examples import make
-from tests.studies.sweeps.independent import Tables, Wheel, forced, smooth_is_unstable
+from tests.studies.sweeps.independent import Tables, forced, smooth_is_unstable
 from tests.studies.sweeps.shoes import drawn
 
 pytestmark = pytest.mark.usefixtures("without_runs")
 
 SEEDS = {  # shoes with a critical value in their range
-    "opening": [2, 5, 6, 7, 8, 9, 10, 11, 13, 15, 16, 17, 19, 21, 26, 28, 29, 30, 31, 34],
-    "undamped": [2, 3, 4, 5, 7, 9, 16, 17, 19],
-    "passing": [1, 2, 3, 8, 10, 11, 13, 18, 21, 22, 23, 24],
-    "smooth": [1, 2, 5, 10, 16, 20, 27, 32],
-    "soft": [6, 8, 9, 10, 13, 21, 26, 29, 42, 56],
+    "opening": [2, 6, 9, 13, 17, 26],
+    "undamped": [2, 5, 9, 17],
+    "passing": [1, 8, 11, 21],
+    "smooth": [2, 10, 20, 27],
+    "soft": [6, 13, 29, 42],
 }
 FEW = [("smooth", 10), ("smooth", 27), ("soft", 42)]
 INDEPENDENT = 3e-5  # of the range: what three times as many cells and steps of the other integrator move
@@ -92,20 +88,6 @@ def test_the_truth_lies_within_the_error_bar(kind: str, seed: int) -> None:
     assert changes_within(tables, key, found.value, bar, start)
 
 
-DAMPING: Tables = {  # its weights damp: an error of first order, 11 % of the growth at a step
-    "shoe": {"mass": 18.55},
-    "wheel": {"radius": 0.33, "angular_speed": 48.57},
-    "link1": {"stiffness": 9392000.0, "damping": 68.27, "angle_deg": 0.0},
-    "link2": {"stiffness": 15550000.0, "damping": 53.02, "angle_deg": 26.34},
-    "load": {"force": 2304.0},
-    "friction": {"coefficient": 0.1},
-    "contact": {"half_length": 0.055, "stiffness": 30360000.0},
-    "roughness": {
-        "wheel": {"amplitudes": [0.0001283], "wavelengths": [0.056]},
-        "shoe": {"amplitudes": [5.594e-05], "wavelengths": [0.01]},
-    },
-    "solver": {"duration": 0.4, "scheme": "two-layer", "step": 6.6e-5, "theta": [0.52, 0.5]},
-}
 BETWEEN: Tables = {  # stable for half a per cent of the range
     "shoe": {"mass": 9.792},
     "wheel": {"radius": 0.2, "angular_speed": 25.44},
@@ -122,62 +104,20 @@ BETWEEN: Tables = {  # stable for half a per cent of the range
 }
 
 
-@pytest.mark.parametrize(("tables", "upper", "windows"), [(DAMPING, 4.0, 1), (BETWEEN, 5.8, 2)])
 @campaign
-def test_the_truth_lies_within_the_error_bars_of_all_windows(tables: Tables, upper: float, windows: int) -> None:
+def test_the_truth_lies_within_the_error_bars_of_all_windows() -> None:
+    upper = 5.8
     key = "friction__coefficient"
     critical = Critical(parameter="friction.coefficient", lower=0.0, upper=upper, tolerance=1e-4)
-    found = search(critical, Line(make(tables), [critical.parameter], critical.lower, critical.upper))
+    found = search(critical, Line(make(BETWEEN), [critical.parameter], critical.lower, critical.upper))
     ends = np.ravel(found.windows)
     errors = np.ravel(found.window_errors)
     assert (found.value, found.error) == (ends[0], errors[0])
-    assert len(found.windows) == windows
+    assert len(found.windows) == 2
     assert (ends[-1], errors[-1]) == (upper, 0.0)
     for end, error in zip(ends[:-1], errors, strict=False):
         assert error < 0.045 * end
-        assert changes_within(tables, key, end, error, end - 1.5 * error)
-
-
-@campaign
-def test_a_window_of_a_twelve_thousandth_of_the_range_is_that_of_another_integrator() -> None:
-    """It follows no motion to there, but finds those of the branch, and their growth."""
-    found, tables, key, lower, upper = answer("undamped", 11)
-    assert found.value is not None
-    assert found.windows[0][1] - found.windows[0][0] < (upper - lower) / 1e4
-    critical = Critical(parameter=key.replace("__", "."), lower=lower, upper=upper)
-    answers = Answers(explored(critical, make(tables, **{key: lower})).explored, None)
-    for value, unstable in ((0.0177, False), (0.018, True), (0.0183, False)):
-        wheel = Wheel(at(tables, key, value))
-        rates = list[float]()
-        for point in crossing(answers.bases[0], answers.line.place(value)):  # on each of its sheets
-            closed = wheel.closed(np.array(point.facts.state))
-            assert closed is not None
-            largest = float(np.abs(np.linalg.eigvals(closed[1])).max())
-            rates.append(math.log(largest) / wheel.period - wheel.level)
-        assert rates
-        assert (min(rates) > 0.0) is unstable
-
-
-@campaign
-def test_a_narrow_window_lies_where_the_scheme_vibrates_at_half_the_frequency_of_a_wave() -> None:
-    """At the exact natural frequency, half a width of the window away, the scheme at its step is stable."""
-    tables: Tables = {
-        "shoe": {"mass": 15.6},
-        "wheel": {"radius": 0.5, "angular_speed": 6.903},
-        "link1": {"stiffness": 2150000.0, "damping": 0.0, "angle_deg": -11.8},
-        "link2": {"stiffness": 1410000.0, "damping": 0.0, "angle_deg": 13.2},
-        "load": {"force": 631.0},
-        "friction": {"coefficient": 1.73},
-        "contact": {"half_length": 0.01, "stiffness": 21700000.0},
-        "roughness": {"wheel": {"amplitudes": [2.59e-5, 3.51e-5], "wavelengths": [0.035, 0.064]}},
-        "solver": {"duration": 0.3, "step": 0.00026},
-    }
-    key = "friction__coefficient"
-    critical = Critical(parameter="friction.coefficient", lower=1.4, upper=2.2)
-    found = search(critical, Line(make(tables), [critical.parameter], critical.lower, critical.upper))
-    assert found.value is not None
-    assert found.error is not None
-    assert changes_within(tables, key, found.value, found.error, 1.4)
+        assert changes_within(BETWEEN, key, end, error, end - 1.5 * error)
 
 
 @campaign

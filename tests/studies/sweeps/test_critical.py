@@ -16,10 +16,8 @@ from brakecli.case.system import system_of
 from brakecli.solver.integrate import solve
 from brakecli.solver.links import natural_frequencies
 from brakecli.solver.period import common_period
-from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.solver.system import Initial
 from brakecli.studies.sweeps.critical import search
-from brakecli.studies.sweeps.lyapunov import exponent
 from brakecli.studies.sweeps.simulate import verdict_of
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search
@@ -28,8 +26,6 @@ from tests.campaign import campaign, counts
 from tests.commands import ROOT
 from tests.examples import MODE_COUPLING, ROUGH, SQUEAL, make
 from tests.studies.sweeps.independent import smooth_is_unstable
-
-WAVES = {"amplitudes": [1e-6, 7e-7], "wavelengths": [0.02, 0.011]}
 
 OPENS: dict[str, Any] = {  # surfaces that open; the wheel repeats after 11.3 ms, the shoe's waves do not matter
     "shoe": {"mass": 17.109774},
@@ -44,16 +40,6 @@ OPENS: dict[str, Any] = {  # surfaces that open; the wheel repeats after 11.3 ms
         "wheel": {"amplitudes": [2.1238e-5], "wavelengths": [0.038]},
     },
     "solver": {"step": 2e-5, "duration": 0.5},
-}
-SOFT: dict[str, Any] = {  # a soft link lets the shoe run far before it locks
-    "shoe": {"mass": 4.357554925953838},
-    "wheel": {"radius": 0.5, "angular_speed": 4.0},
-    "link1": {"stiffness": 1549163.5720932626, "damping": 250.09318022772501},
-    "link2": {"stiffness": 4476.515362739354, "damping": 250.09318022772501, "angle_deg": -15.760678435130377},
-    "load": {"force": 1000.0},
-    "friction": {"coefficient": 0.3},
-    "contact": {"half_length": 0.05, "stiffness": 103205132.89205056},
-    "solver": {"step": 6.344985077102577e-05, "duration": 0.3},
 }
 
 
@@ -120,18 +106,6 @@ def test_divergence_is_found_where_steady_sliding_ends() -> None:
     assert exact.instability == "divergence"
     _, lower, upper, _ = bracket(found(tables, 0.0, 1.5 * exact.friction, tolerance=1e-3))
     assert lower <= exact.friction <= upper
-
-
-@pytest.mark.parametrize("lengths", [[0.022, 0.011], pytest.param(WAVES["wavelengths"], marks=campaign)])
-def test_roughness_in_full_contact_does_not_move_the_critical_friction(lengths: list[float]) -> None:
-    """On the second wheel the waves repeat after ten times as long a way."""
-    flat = found(SQUEAL, 0.3, 0.9, tolerance=1e-4)
-    wheel = {**WAVES, "wavelengths": lengths}
-    rough = found(SQUEAL, 0.3, 0.9, tolerance=1e-4, roughness__shoe=WAVES, roughness__wheel=wheel)
-    assert flat.value is not None
-    # The growth rises by 140 1/s per unit of friction here, and roughness moves it by less than 1e-3 1/s.
-    assert rough.value == pytest.approx(flat.value, abs=0.05 * 1e-4 + 1e-3 / 140.0)
-    assert rough.eigenvalue == pytest.approx(flat.eigenvalue, rel=1e-12)
 
 
 def test_another_parameter_than_friction_is_searched_by_both_methods() -> None:
@@ -201,23 +175,6 @@ def test_slow_sliding_is_no_stick_to_a_three_layer_scheme(speed: float) -> None:
     assert answer.value == pytest.approx(exact.friction, abs=1e-3)
 
 
-def test_a_linear_motion_that_fades_slowly_does_not_last() -> None:
-    """A run of 11 ms just below the critical value, in which the amplitude falls by less than it beats."""
-    tables = {
-        "shoe": {"mass": 0.3758825},
-        "wheel": {"radius": 0.5, "angular_speed": 1.1062112},
-        "link1": {"stiffness": 2986894.5, "damping": 42.954388},
-        "link2": {"stiffness": 109023354.0, "damping": 306.16288, "angle_deg": 36.433232},
-        "load": {"force": 897.52732},
-        "friction": {"coefficient": 0.3},
-        "contact": {"half_length": 0.0966432, "stiffness": 241389442.0},
-        "solver": {"step": 1.9945717e-6, "duration": 0.0112227},
-    }
-    answer = found(tables, 0.2, 1.8, tolerance=1e-3)
-    assert answer.value == pytest.approx(0.889988, abs=1e-3)
-    assert answer.sustained == pytest.approx(answer.value, abs=1e-3)
-
-
 def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
     """Over its own duration the amplitude still falls, towards a limit cycle far below the critical value."""
     tables = {
@@ -236,25 +193,6 @@ def test_a_start_that_takes_long_to_settle_is_given_the_time() -> None:
     verdict = verdict_of(make(tables, friction__coefficient=4.0, solver__duration=16.0))  # as one of 6 s asks
     assert verdict is not None
     assert verdict.regime == "relaxation"
-
-
-def test_self_locking_on_rough_surfaces_in_full_contact_is_that_on_flat_ones() -> None:
-    tables = {
-        "shoe": {"mass": 1.0},
-        "wheel": {"radius": 0.5, "angular_speed": -1.2},
-        "link1": {"stiffness": 7.5e5, "damping": 40.0},
-        "link2": {"stiffness": 3.8e6, "damping": 48.0, "angle_deg": 31.0},
-        "load": {"force": 2000.0},
-        "friction": {"coefficient": 0.3},
-        "contact": {"half_length": 0.05, "stiffness": 2.2e7},
-        "solver": {"step": 2e-5, "duration": 0.1},
-    }
-    flat = stability(system_of(make(tables))).critical
-    rough = stability(system_of(make(tables, roughness__wheel=WAVES))).critical
-    assert flat is not None
-    assert rough is not None
-    assert flat.instability == rough.instability == "divergence"
-    assert rough.friction == pytest.approx(flat.friction, rel=1e-6)
 
 
 def test_roughness_that_opens_the_contact_moves_the_critical_friction() -> None:
@@ -296,23 +234,6 @@ def event_driven_growth(friction: float) -> float:
     return math.log(float(np.abs(np.linalg.eigvals(derivative)).max())) / period
 
 
-@pytest.mark.parametrize("friction", [0.6, 1.2, 1.8, 1.9, 2.1])
-def test_an_exponent_without_a_common_period_agrees_with_multipliers_or_is_undecided(
-    friction: float,
-) -> None:
-    """A second wave of 10⁻¹³ m takes the period away and changes nothing else."""
-    wheel = {"amplitudes": [2.1238e-5, 1e-13], "wavelengths": [0.038, 0.038 * math.sqrt(2.0)]}
-    tables = {**OPENS, "roughness": {**OPENS["roughness"], "wheel": wheel}}
-    system = system_of(make(tables, friction__coefficient=friction))
-    assert common_period(system) is None
-    measured = exponent(system, steady_sliding(system))
-    rate = event_driven_growth(friction)
-    assert measured is not None
-    assert measured.positive in (rate > 0.0, None)
-    if measured.positive is not None or rate < 0.0:
-        assert abs(measured.value - rate) <= measured.error + 0.1
-
-
 @pytest.mark.usefixtures("without_runs")
 @pytest.mark.parametrize(
     ("angle", "friction", "unstable"),
@@ -333,13 +254,6 @@ def test_multipliers_of_one_are_no_instability_without_dashpots(
     critical = Critical(parameter="friction.coefficient", lower=0.05, upper=2.0)
     answer = search(critical, Line(bare, [critical.parameter], critical.lower, critical.upper))
     assert any(low < friction < high for low, high in answer.windows) is unstable
-
-
-@campaign
-def test_the_error_bar_on_surfaces_that_open_holds_where_the_multiplier_passes_one() -> None:
-    answer = found(OPENS, 1.94, 1.97, tolerance=2e-3)
-    value, _, _, error = bracket(answer)
-    assert event_driven_growth(value - error) < 0.0 < event_driven_growth(value + error)
 
 
 @campaign
@@ -378,31 +292,6 @@ def test_windows_are_found_by_both_methods_and_cut_by_the_bounds() -> None:
         assert above.windows == ((above.value, 0.9),)
         assert found(SQUEAL, 0.0, 0.3, method=method).windows == ()
         assert found(SQUEAL, 0.8, 1.2, method=method).windows == ((0.8, 1.2),)
-
-
-def test_a_window_between_two_values_of_the_scan_has_a_narrow_bar() -> None:
-    """Two-layer steps are as exact as the eigenvalues here: -83.3456, 0.3913, 6.2881 by their polynomial."""
-    changes = {"friction__coefficient": 0.7, "solver__scheme": "two-layer", "solver__step": 2e-5}
-    answer = found(SQUEAL, -90.0, 90.0, "link2__angle_deg", tolerance=0.1, **changes)
-    upper = answer.windows[1]
-    error = answer.window_errors[1]
-    assert answer.outcome is Outcome.FOUND
-    np.testing.assert_allclose([answer.windows[0][1], *upper], [-83.3456, 0.3913, 6.2881], atol=0.05)
-    assert max(error) < 0.1
-    assert answer.bias is not None
-    assert abs(answer.bias) < 1e-3
-
-
-@pytest.mark.parametrize("scheme", ["two-layer", pytest.param("three-layer", marks=campaign)])
-@campaign
-def test_rounding_of_a_far_position_is_in_the_error_bar_near_self_locking(scheme: str) -> None:
-    exact = stability(system_of(make(SOFT))).critical
-    assert exact is not None
-    assert exact.instability == "divergence"
-    answer = found(SOFT, 0.0, 1.5 * exact.friction, tolerance=1e-5 * exact.friction, solver__scheme=scheme)
-    value, _, _, error = bracket(answer)
-    assert abs(value - exact.friction) <= error
-    assert error < 0.01 * exact.friction
 
 
 def test_without_dashpots_rounding_near_self_locking_is_in_the_error_bar() -> None:

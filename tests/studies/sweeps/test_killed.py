@@ -3,7 +3,6 @@
 import os
 import random
 import re
-import signal
 import sys
 import time
 from functools import partial
@@ -18,7 +17,7 @@ from brakecli.results.read import open_result
 from brakecli.studies.sweeps.workers.local import LocalEngine
 from brakecli.studies.sweeps.workers.task import Task
 from tests.campaign import campaign
-from tests.commands import ROOT, TINY, brakecli, ended, left_in, run, shell, started, wait_until
+from tests.commands import ROOT, TINY, brakecli, left_in, run, shell, started, wait_until
 from tests.studies.sweeps.helpers import (
     PROGRAM,
     WICKED,
@@ -80,18 +79,6 @@ def test_workers_die_with_their_parent_whatever_they_are_in(tmp_path: Path) -> N
         crew = children(process.pid)
         process.kill()
         wait_until(lambda: not any(map(alive, crew)))  # what they compute does not end
-
-
-@campaign
-def test_a_killed_worker_costs_a_warning_and_no_point(good: Path, here: Path) -> None:
-    with started("sweep", "s.toml", "--quiet", "-j", "2", cwd=here) as process:
-        wait_until(lambda: journal_size(here) > 2000)
-        os.kill(min(workers(process.pid)), signal.SIGKILL)
-        done = ended(process)
-    told = done.told(0, "brakecli: warning: a worker process has failed (its process was killed by")
-    assert told.count("\n") == 1
-    assert (here / "s.h5").read_bytes() == (good / "s.h5").read_bytes()
-    assert left_in(here) == {"tiny.toml", "s.toml", "s.h5"}
 
 
 @pytest.mark.parametrize(

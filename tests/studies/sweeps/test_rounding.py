@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 from brakecli.analysis.branches.line import Line
-from brakecli.analysis.stability.certain import Rounded, conditions, links_of
-from brakecli.analysis.stability.modes import modes
-from brakecli.case.system import system_of
+from brakecli.analysis.stability.certain import Rounded
 from brakecli.studies.sweeps.critical import SCANNED_BY_EIGENVALUES, search
 from brakecli.studies.sweeps.tables import Critical
 from brakecli.studies.sweeps.windows import Outcome, Search
 from tests.analysis.shoes import random_shoes
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import make
 from tests.studies.sweeps.independent import Tables, held_by, mpmath, smooth_is_unstable
 
@@ -104,7 +102,7 @@ def held_and_bars(
     return held, bars
 
 
-@pytest.mark.parametrize("shoes", counts(0, 200, 1000))
+@pytest.mark.parametrize("shoes", counts(0, 80, 1000))
 def test_every_bar_of_an_end_of_a_window_holds_the_truth_and_is_narrow(shoes: int) -> None:
     rng = np.random.default_rng(29)
     tried = 0
@@ -170,25 +168,6 @@ def test_the_bracket_of_exact_steps_is_no_narrower_than_the_bar_of_the_eigenvalu
     assert found.upper - found.lower == pytest.approx(2.0 * found.error, rel=1e-6)
 
 
-def test_the_conditions_are_those_of_the_eigenvalues() -> None:
-    rng = np.random.default_rng(31)
-    seen = set[bool]()
-    for _ in range(200):
-        tables = drawn(rng)[0]
-        case = make(tables)
-        system = system_of(case)
-        k = system.contact_stiffness
-        grip = math.copysign(system.coefficients.phi, system.belt_speed)
-        growth = modes(system.coefficients, k, grip)[0].growth
-        size = math.sqrt((system.coefficients.c_xx + system.coefficients.c_yy + k) / system.coefficients.m)
-        if (
-            abs(growth) > 1e-7 * size or not system.coefficients.b_xx
-        ):  # the root of what eigenvalues are rounded by
-            assert any(each.negative for each in conditions(links_of(case), k, grip)) is (growth > 1e-7 * size)
-            seen.add(growth > 0.0)
-    assert seen == {True, False}
-
-
 def test_the_error_of_a_rounded_number_holds_that_of_exact_arithmetic() -> None:
     rng = np.random.default_rng(37)
     with mpmath.workdps(60):
@@ -218,7 +197,8 @@ def test_a_search_may_begin_where_there_is_no_steady_sliding() -> None:
 
 
 @pytest.mark.parametrize(
-    ("place", "key", "low", "high"), [(94, "link2", -4.25, -4.24), (118, "link1", -13.0, -12.0)]
+    ("place", "key", "low", "high"),
+    [(94, "link2", -4.25, -4.24), pytest.param(118, "link1", -13.0, -12.0, marks=campaign)],
 )
 def test_a_window_between_two_of_the_values_that_are_looked_at_is_found(
     place: int, key: str, low: float, high: float
@@ -233,36 +213,3 @@ def test_a_window_between_two_of_the_values_that_are_looked_at_is_found(
     assert not any((begin <= values) & (values <= end))
     sides = [unstable(at(tables, key, value)) for value in (begin - 1e-9, begin + 1e-9, end - 1e-9, end + 1e-9)]
     assert sides == [False, True, True, False]
-
-
-@pytest.mark.parametrize(("low", "high", "beyond"), [(2.99e6, 8e6, 1e-6), (1e5, 1e9, 1e-5)])
-def test_a_window_beside_an_end_of_the_range_is_found(low: float, high: float, beyond: float) -> None:
-    """About c2 = 3 MN/m, where friction is a little above the least critical one; a scan begins next to it."""
-    tables = at(UNDAMPED, "friction__coefficient", UNDAMPED["friction"]["coefficient"] * (1.0 + beyond))
-    found = answer(tables, "link2__stiffness", low, high, method="eigenvalue", tolerance=1e-3)
-    ((begin, end),) = found.windows
-    assert begin < 3e6 < end
-    sides = [
-        unstable(at(tables, "link2__stiffness", value))
-        for value in (begin - 1.0, begin + 1.0, end - 1.0, end + 1.0)
-    ]
-    assert sides == [False, True, True, False]
-
-
-def test_three_changes_between_two_of_the_values_are_found() -> None:
-    """Flutter is regained and lost again within 0.03°, between values that are 1.3° apart."""
-    tables: Tables = {
-        "shoe": {"mass": 0.018184234583181535},
-        "wheel": {"radius": 0.5, "angular_speed": 0.2402289906113433},
-        "link1": {"stiffness": 25571.235614265337, "damping": 72.37639015216423, "angle_deg": -27.494473333906924},
-        "link2": {"stiffness": 24459525.473803513, "damping": 161.26142542088354, "angle_deg": -7.0},
-        "load": {"force": 5.137243362604452},
-        "friction": {"coefficient": 1.3020623105393148},
-        "contact": {"half_length": 0.01352634705162007, "stiffness": 585672.414778953},
-        "solver": {"duration": 0.1},
-        "output": {"sample_interval": 1e-4},
-    }
-    found = answer(tables, "link2__angle_deg", *RANGES["link2__angle_deg"], method="eigenvalue", tolerance=1e-3)
-    assert np.ravel(found.windows) == pytest.approx([62.476295, 62.476731, 62.505527, 85.0], abs=1e-6)
-    held, _ = held_and_bars(found, tables, "link2__angle_deg", *RANGES["link2__angle_deg"])
-    assert held == [True, True, True]

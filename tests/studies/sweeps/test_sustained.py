@@ -23,7 +23,6 @@ from brakecli.studies.sweeps.windows_of_branch import explored
 from tests.campaign import campaign
 from tests.examples import SQUEAL, make
 from tests.studies.sweeps.test_critical import found
-from tests.studies.sweeps.test_windows import SHOES
 
 KICKED: dict[
     str, Any
@@ -62,33 +61,6 @@ ANGLED: dict[str, Any] = {  # the less the second link leans, the less it vibrat
     "initial": {"at": "rest"},
     "solver": {"scheme": "two-layer", "theta": [0.5, 0.5], "step": 3.5087e-05, "duration": 0.60724},
     "output": {"sample_interval": 0.00017543},
-}
-SHAKEN: dict[str, Any] = {  # full contact: fades at 1.4955 … 1.742, more slowly the nearer to the critical 1.7439
-    "shoe": {"mass": 1.13},
-    "wheel": {"radius": 0.33, "angular_speed": 87.94},
-    "link1": {"stiffness": 2244000.0, "damping": 2.924, "angle_deg": -14.48},
-    "link2": {"stiffness": 1256000.0, "damping": 1.766, "angle_deg": 16.97},
-    "load": {"force": 3027.0},
-    "friction": {"coefficient": 0.1},
-    "contact": {"half_length": 0.015, "stiffness": 42200000.0},
-    "roughness": {
-        "wheel": {"amplitudes": [3.343e-05], "wavelengths": [0.052]},
-        "shoe": {"amplitudes": [3.624e-06, 3.565e-06], "wavelengths": [0.025, 0.021]},
-    },
-    "output": {"sample_interval": 0.00018},
-    "solver": {"duration": 0.22},
-}
-OPEN: dict[str, Any] = {  # nothing lasts at 550 … 599 MN/m² but what the passing wave forces; critical is 600
-    "shoe": {"mass": 14.58},
-    "wheel": {"radius": 0.33, "angular_speed": 24.82},
-    "link1": {"stiffness": 11810000.0, "damping": 80.97},
-    "link2": {"stiffness": 55030000.0, "damping": 105.4, "angle_deg": 18.97},
-    "load": {"force": 715.5},
-    "friction": {"coefficient": 1.069},
-    "contact": {"half_length": 0.015, "stiffness": 778500000.0},
-    "roughness": {"wheel": {"amplitudes": [8.347e-06], "wavelengths": [0.034]}},
-    "output": {"sample_interval": 0.00016},
-    "solver": {"duration": 0.2, "tolerance": 1e-3},
 }
 BOUNCING: dict[str, Any] = {  # dies out from 4.2 compressions to 1e-14 at 1.865, and keeps half of one at 1.876
     "shoe": {"mass": 0.586},
@@ -156,31 +128,6 @@ def test_what_lasts_at_the_lower_bound_only_does_not_last_throughout() -> None:
     answer = found(ANGLED, -27.1, -11.1, "link2__angle_deg", tolerance=0.05)
     assert answer.outcome is Outcome.REGAINED
     assert (answer.sustained, answer.sustained_outcome) == (None, Outcome.IN_PART)
-
-
-@campaign
-@pytest.mark.parametrize(
-    ("tables", "key", "ends", "tolerance", "fades_up_to"),
-    [
-        (SHAKEN, "friction__coefficient", (0.0, 5.3), 0.001, 1.742),
-        (OPEN, "contact__stiffness", (2.336e8, 2.336e9), 2.1e6, 5.99e8),
-    ],
-)
-def test_slow_decay_or_what_is_forced_on_a_rough_pad_does_not_last(
-    tables: dict[str, Any], key: str, ends: tuple[float, float], tolerance: float, fades_up_to: float
-) -> None:
-    answer = found(tables, *ends, key, tolerance=tolerance)
-    assert answer.sustained is None or answer.sustained > fades_up_to - tolerance
-
-
-@campaign
-def test_what_lasts_beside_a_motion_that_opens_does_not_fade() -> None:
-    """Full contact loses stability at 1.558. Above, runs of ten durations and more of another integrator end in a
-    vibration of the shoe's own, also at 1.57, although a motion that opens is stable to 1.89.
-    """
-    answer = found(SHOES["over a gap"]["case"], 1.2, 2.4, tolerance=0.02)
-    assert answer.outcome is Outcome.FOUND
-    assert answer.sustained is None or answer.sustained < 1.65
 
 
 def test_what_bounces_longer_than_a_run_beside_stable_sliding_does_not_last() -> None:
