@@ -97,13 +97,13 @@ def brakecli(
     stdout: str | None = None,
     **changes: str | None,
 ) -> Done:
-    """Run one command to its end: a fork, unless it needs another environment or standard input.
+    """Run one command to its end: a fork, unless it needs another environment than another width of lines.
 
     `stdout`: where a fork writes to, instead of into the answer.
     """
     words = [str(argument) for argument in arguments]
-    if stdin is None and not changes:
-        return forked(*words, cwd=cwd, stdout=stdout)
+    if not changes.keys() - {"COLUMNS"}:
+        return forked(*words, cwd=cwd, stdout=stdout, stdin=stdin or "", columns=changes.get("COLUMNS"))
     done = subprocess.run(
         [*COMMAND, *words],
         cwd=cwd,
@@ -115,12 +115,19 @@ def brakecli(
     return Done(done.returncode, done.stdout.decode(), done.stderr.decode())
 
 
-def forked(*words: str, cwd: Path, stdout: str | None = None, memory: int | None = None) -> Done:
+def forked(
+    *words: str,
+    cwd: Path,
+    stdout: str | None = None,
+    memory: int | None = None,
+    stdin: str = "",
+    columns: str | None = None,
+) -> Done:
     """Run one command in a fork, which may take so many bytes of memory."""
     server = _server()
     assert server.stdin is not None
     assert server.stdout is not None
-    server.stdin.write(json.dumps([str(cwd), words, stdout, memory]) + "\n")
+    server.stdin.write(json.dumps([str(cwd), words, stdout, memory, stdin, columns]) + "\n")
     server.stdin.flush()
     return Done(**json.loads(server.stdout.readline()))
 
@@ -242,16 +249,19 @@ def _serve() -> None:
     gc.freeze()  # a fork then leaves the memory of the server as it is
 
     for line in sys.stdin:
-        cwd, words, place, memory = json.loads(line)
-        with TemporaryFile() as out, TemporaryFile() as err, Path(os.devnull).open("rb") as nothing:
+        cwd, words, place, memory, typed, columns = json.loads(line)
+        with TemporaryFile() as out, TemporaryFile() as err, TemporaryFile() as given:
+            given.write(typed.encode())
+            given.seek(0)
             child = os.fork()
             if child == 0:
                 os.chdir(cwd)
+                os.environ.update({"COLUMNS": columns} if columns else {})
                 if memory:
                     pages = int(Path("/proc/self/statm").read_text().split()[0])
                     resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + memory,) * 2)
                 written = os.open(place, os.O_WRONLY) if place else out.fileno()
-                for number, opened in enumerate((nothing.fileno(), written, err.fileno())):
+                for number, opened in enumerate((given.fileno(), written, err.fileno())):
                     os.dup2(opened, number)
                 os._exit(_code_of(main, ["brakecli", *words]))
             _, status, usage = os.wait4(child, 0)

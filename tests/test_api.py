@@ -87,24 +87,6 @@ def test_outputs_stay_only_where_they_are_asked_for(tmp_path: Path, monkeypatch:
     assert [each.name for each in tmp_path.iterdir()] == ["kept.h5"]
 
 
-@campaign
-def test_settings_lead_to_the_same_run_whether_the_case_was_loaded_before_or_not(tmp_path: Path) -> None:
-    places = np.linspace(0.0, np.pi, 180, endpoint=False)  # m; a turn of a wheel of 0.5 m
-    heights = 1e-6 * np.sin(2.0 * places)
-    np.savetxt(tmp_path / "runout.csv", np.transpose([places, heights]), delimiter=",")
-    (tmp_path / "c.toml").write_text(f'{TINY}\nroughness.wheel.profile = "runout.csv"\n')
-    for settings in ({"wheel.radius": 0.6}, {"roughness.wheel.profile_error": 0.5}, {"solver.step": 5e-5}, {}):
-        loaded = brakecli.load(tmp_path / "c.toml")
-        assert brakecli.run(loaded, settings).identical(brakecli.run(tmp_path / "c.toml", settings)), settings
-
-
-def test_a_file_that_was_changed_is_read_again(tmp_path: Path) -> None:
-    file = tmp_path / "c.toml"
-    for load in (5000.0, 4000.0):
-        file.write_text(TINY.replace("load.force = 5000.0", f"load.force = {load}"))
-        assert brakecli.load(file).case.load.force == load
-
-
 def test_stability_is_that_of_the_command() -> None:
     printed = command("stability", CASE, "--set", "friction.coefficient=0.4", "--json", cwd=HERE).json
     found = brakecli.stability(CASE, {"friction": {"coefficient": np.float64(0.4)}})
@@ -126,18 +108,6 @@ def test_what_one_function_returns_the_next_takes() -> None:
     less = brakecli.run(CASE, {**SHORT, "friction.coefficient": 0.5 * found.critical_friction})
     assert less.attrs["regime"] == "damped"
     assert brakecli.run(less)["history"].to_dataset().identical(less["history"].to_dataset())
-
-
-def test_modes_follow_a_key_as_in_the_command() -> None:
-    printed = command("stability", CASE, "--vary", "link2.angle_deg=1:10:4", "--json", cwd=HERE).json
-    found = brakecli.stability(CASE, vary={"link2.angle_deg": np.linspace(1, 10, 4)})
-    assert found.sizes == {"link2_angle_deg": 4, "mode": 2}
-    assert found.frequencies.values.tolist() == [each["frequencies"] for each in printed["vary"]]
-    assert brakecli.stability(CASE, vary={"link2.angle_deg": {"start": 1, "stop": 10, "num": 4}}).identical(found)
-    with pytest.raises(UsageError, match="rise or fall"):
-        brakecli.stability(CASE, vary={"link2.angle_deg": {"start": 1.0, "stop": 1.0, "num": 4}})
-    with pytest.raises(UsageError, match="one key"):
-        brakecli.stability(CASE, vary={})
 
 
 def test_a_sweep_is_that_of_its_file(tmp_path: Path) -> None:
@@ -163,15 +133,6 @@ def test_whole_numbers_along_an_axis_stay_whole_where_their_key_is(tmp_path: Pat
     found = brakecli.sweep(tmp_path / "t.toml", {"roughness.wheel": {"spectrum": spectrum}}, axes=axes, jobs=1)
     assert found.roughness_wheel_spectrum_seed.values.tolist() == seeds
     assert (found.roughness_wheel_spectrum_seed.dtype.kind, found.shoe_mass.dtype.kind) == ("i", "f")
-
-
-def test_a_signal_is_classified(tmp_path: Path) -> None:
-    time_axis = np.arange(4000) / 2e4
-    rows = "\n".join(f"{t},{math.sin(2 * math.pi * 400.0 * t)}" for t in time_axis)
-    (tmp_path / "s.csv").write_text(f"t,v\n{rows}\n")
-    verdict = brakecli.classify(tmp_path / "s.csv", "velocity", column="v", time_column="t")
-    assert verdict.regime == "quasi-harmonic"
-    assert abs(float(verdict.frequency) - 400.0) < 0.5  # a tenth of the distance of two lines, 1 / 0.2 s
 
 
 def test_errors_are_those_of_the_commands(tmp_path: Path) -> None:
@@ -290,24 +251,6 @@ def test_a_run_that_fails_raises_and_keeps_its_history(tmp_path: Path) -> None:
     assert brakecli.load(tmp_path / "r.h5").attrs["status"] == "failed"
 
 
-def test_warnings_are_those_of_the_command(tmp_path: Path) -> None:
-    steep = {**SHORT, "friction.coefficient": 1e9}
-    with (
-        pytest.warns(UserWarning, match=r"friction\.coefficient: 1e\+09 is more than 2;"),
-        pytest.warns(UserWarning, match="stick and slip are not resolved"),
-    ):
-        brakecli.run(CASE, steep)
-    heavy = {"shoe.mass": 1000.0, "solver.duration": 0.001}
-    for asked in (
-        lambda: brakecli.stability(CASE, heavy, pushes=0),
-        lambda: brakecli.advise(CASE, heavy, keys="shoe.mass"),
-        lambda: brakecli.branch(CASE, heavy, parameter={"friction.coefficient": (0.1, 0.2)}, pushes=0),
-        lambda: brakecli.sweep(CASE, heavy, axes={"friction.coefficient": [0.1, 0.2]}, jobs=1),
-    ):
-        with pytest.warns(UserWarning, match="were grams meant"):
-            asked()
-
-
 def test_other_threads_compute_as_well() -> None:
     found = list[Any]()
     thread = threading.Thread(target=lambda: found.append(brakecli.run(CASE, SHORT)))
@@ -388,23 +331,6 @@ def test_results_in_memory_are_drawn_compared_and_reported_like_their_files(tmp_
     assert (tmp_path / "page.html").read_text() == page
 
 
-@campaign
-def test_a_measured_signal_is_drawn_and_its_bursts_are_records(tmp_path: Path) -> None:
-    when = np.arange(10_000) / 1e4
-    tone = np.where((when > 0.25) & (when < 0.75), np.sin(2 * math.pi * 2000.0 * when), 0.0)
-    np.savetxt(tmp_path / "p.csv", tone + 1e-3 * np.random.default_rng(1).standard_normal(when.size))
-    how: dict[str, Any] = {"sample_rate": 1e4}
-    [burst] = brakecli.classify(tmp_path / "p.csv", "pressure", **how).brakecli.bursts
-    assert abs(burst.frequency - 2000.0) < 2.0  # a line is 1 / 0.5 s wide
-    assert abs(burst.end - burst.start - 0.5) < 0.1
-    brakecli.plot(tmp_path / "p.csv", "pressure", output=tmp_path / "own.png", **how)
-    line = ["plot", "p.csv", "--quantity", "pressure", "--sample-rate", "1e4", "-o", "p.png"]
-    command(*line, cwd=tmp_path).told(0)
-    assert (tmp_path / "own.png").read_bytes() == (tmp_path / "p.png").read_bytes()
-    with pytest.raises(UsageError, match="select, variable and section: are for results"):
-        brakecli.plot(tmp_path / "p.csv", "pressure", variable="x", **how)
-
-
 def test_objects_of_a_result_are_records() -> None:
     found = brakecli.stability(CASE)
     shown = found.brakecli
@@ -458,16 +384,6 @@ def test_tables_say_what_results_of_other_kinds_answer() -> None:
     )
     modes = brakecli.stability(CASE, vary={"friction.coefficient": [0.1, 0.9]})
     assert f"{modes.attrs['critical_values']:.4g}" in repr(modes.brakecli)
-
-
-@campaign
-def test_a_branch_begins_at_a_run_in_memory() -> None:
-    along: dict[Any, Any] = {"friction.coefficient": (0.5, 0.9)}
-    ended = brakecli.run(CASE, {"solver": {"tolerance": 1e-6, "duration": 1.0}})
-    found = [brakecli.branch(CASE, parameter=along, start=start) for start in (ended, [ended])]
-    assert found[0].identical(found[1])
-    with pytest.raises(UsageError, match=r"start: the value of friction\.coefficient in its case"):
-        brakecli.branch(CASE, parameter={"friction.coefficient": (0.0, 0.5)}, start=ended)
 
 
 def test_a_motion_is_followed_along_an_axis_as_in_a_file(tmp_path: Path) -> None:
@@ -629,23 +545,12 @@ def test_what_no_function_takes_is_an_error_of_usage(given: str) -> None:
     assert "; " in str(refused.value)
 
 
-def test_a_number_of_hundreds_of_digits_is_out_of_range(tmp_path: Path) -> None:
-    (tmp_path / "c.toml").write_text(TINY)
-    for values in ([0.1, 10**300], [10**300, 1]):
-        axes: dict[Any, Any] = {"friction.coefficient": values}
-        with pytest.raises(CaseError, match=r"friction\.coefficient: is not between 1e-100 and 1e\+100"):
-            brakecli.sweep(tmp_path / "c.toml", axes=axes, direction="up", jobs=1)
-    text = f'case = "c.toml"\n[[axis]]\nparameter = "shoe.mass"\ndirection = "up"\nvalues = [1, {10**400}]\n'
-    (tmp_path / "s.toml").write_text(text)
-    with pytest.raises(CaseError, match=r"direction: needs numbers to follow"):
-        brakecli.sweep(tmp_path / "s.toml", jobs=1)
-
-
 def _swept(case: str, jobs: int) -> list[float]:
     found = brakecli.sweep(case, axes=ALONG, jobs=jobs)
     return [float(each) for each in found.amplitude]
 
 
+@campaign
 def test_a_worker_of_a_pool_computes_a_sweep_itself(tmp_path: Path) -> None:
     """It may start no processes."""
     (tmp_path / "c.toml").write_text(TINY)
@@ -700,14 +605,6 @@ def test_a_profile_may_be_an_array(tmp_path: Path) -> None:
             brakecli.run(tmp_path / "c.toml", {"roughness.wheel.profile": wrong})
 
 
-def test_an_array_is_called_so_where_it_does_not_fit() -> None:
-    flat = np.repeat(np.linspace(0.0, 1e-3, 99), 2).reshape(-1, 2)  # heights on a straight line
-    with pytest.raises(CaseError, match="straight line") as caught:
-        brakecli.load(CASE, {"roughness.wheel.profile": flat})
-    assert '(found "/array ' in str(caught.value)
-    assert "/numpy" not in str(caught.value)
-
-
 def test_an_axis_may_be_a_range_and_is_named_where_it_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "c.toml").write_text(TINY)
 
@@ -747,18 +644,6 @@ def test_what_cannot_be_drawn_or_reported_is_told(tmp_path: Path) -> None:
     for margin in (-0.1, 11, math.nan, "1"):
         with pytest.raises(UsageError, match="is no number from 0 to 10"):
             brakecli.advise(CASE, margin=margin)  # type: ignore[arg-type]
-
-
-def test_a_measured_record_that_dies_out_has_its_damping_ratio(tmp_path: Path) -> None:
-    time = np.arange(4000) * 1e-4
-    rate = 2.0 * math.pi * 150.0
-    ratio = 0.02
-    shape = np.exp(-ratio * rate * time) * np.cos(math.sqrt(1.0 - ratio**2) * rate * time)
-    np.savetxt(tmp_path / "d.csv", np.column_stack([time, 1e-5 * shape]), header="t,x", delimiter=",", comments="")
-    verdict = brakecli.classify(tmp_path / "d.csv", "displacement", column="x", time_column="t")
-    assert float(verdict.damping_ratio) == pytest.approx(ratio, rel=0.01)
-    assert 0.0 <= float(verdict.damping_ratio_error) < 0.01 * ratio
-    assert verdict.damping_ratio.attrs["units"] == "1"
 
 
 SHELL_ALONE = {"as_json", "details", "quiet", "second_run"}

@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -10,11 +11,12 @@ from benchmarks.size import is_packed, is_starred
 from tests.commands import ROOT
 
 PACKAGE = ROOT / "brakecli"
+parsed = cache(ast.parse)
 
 
 def arrows(text: str) -> Iterator[str]:
     """What a file imports of the package itself, at its top and inside functions."""
-    for node in ast.walk(ast.parse(text)):
+    for node in ast.walk(parsed(text)):
         if isinstance(node, ast.Import):
             yield from (each.name for each in node.names if each.name == "brakecli")
         elif isinstance(node, ast.ImportFrom) and (node.module == "brakecli" or node.level):
@@ -52,7 +54,7 @@ def test_no_room_imports_the_face() -> None:
 
 
 def test_the_face_imports_nothing_but_the_version_until_it_is_used() -> None:
-    tree = ast.parse(Path(PACKAGE, "__init__.py").read_text())
+    tree = parsed(Path(PACKAGE, "__init__.py").read_text())
     at_once = [node.module for node in tree.body if isinstance(node, ast.ImportFrom)]
     assert at_once == ["typing", "brakecli.about"]
 
@@ -77,7 +79,7 @@ def holds_numbers(node: ast.expr | None) -> bool:
 
 def shared_names(text: str) -> Iterator[str]:
     """Names at the top of a file that hold several numbers, without a type that says that all are of one kind."""
-    for node in ast.parse(text).body:
+    for node in parsed(text).body:
         pairs: list[tuple[ast.expr, ast.expr | None]] = []
         if isinstance(node, ast.AnnAssign) and "..." not in ast.unparse(node.annotation):
             pairs = [(node.target, node.value)]
@@ -120,7 +122,7 @@ def test_every_number_has_a_name_of_its_own() -> None:
 
 def packed(text: str) -> list[str]:
     """Assignments that pack several things into one line, though none of them needs the others."""
-    return [ast.unparse(node) for node in ast.walk(ast.parse(text)) if is_packed(node)]
+    return [ast.unparse(node) for node in ast.walk(parsed(text)) if is_packed(node)]
 
 
 @pytest.mark.parametrize(
@@ -158,13 +160,13 @@ def is_large_record(node: ast.ClassDef) -> bool:
 
 def large_records(text: str) -> list[str]:
     """The names of such records that a file defines."""
-    nodes = ast.walk(ast.parse(text))
+    nodes = ast.walk(parsed(text))
     return [node.name for node in nodes if isinstance(node, ast.ClassDef) and is_large_record(node)]
 
 
 def filled_by_place(text: str, records: set[str]) -> list[int]:
     """The lines in which these records, or `cls` of one of them, are filled by starred tuples, or by `_make`."""
-    tree = ast.parse(text)
+    tree = parsed(text)
     places = [(node, records) for node in ast.walk(tree)]
     for owner in ast.walk(tree):
         if isinstance(owner, ast.ClassDef) and owner.name in records:

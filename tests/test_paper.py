@@ -4,7 +4,6 @@ import importlib
 import math
 import random
 import re
-from itertools import product
 
 import numpy as np
 import pytest
@@ -246,43 +245,3 @@ def test_the_page_tells_the_eigenvalues_by_the_angle_of_link_2() -> None:
         alpha = {"link2.angle_deg": float(row[0])}
         assert float(row[3]) == pytest.approx(critical("flat", {**alpha, **NO_DASHPOTS}), abs=PRINTED)
         assert float(row[5]) == pytest.approx(critical("flat", alpha), abs=PRINTED)
-
-
-def test_the_page_tells_the_eigenvalues_by_the_angle_of_link_1() -> None:
-    rows = tables("](paper-beta.png)")
-    assert len(rows) == 15
-    for row in rows:
-        beta = {"link1.angle_deg": float(row[0])}
-        assert float(row[3]) == pytest.approx(critical("flat", {**beta, **NO_DASHPOTS}), abs=PRINTED)
-        assert float(row[5]) == pytest.approx(critical("flat", beta), abs=PRINTED)
-    locked = [row for row in tables("whatever the dashpots.") if row[3] != "–"]
-    assert len(locked) > 4
-    for row in locked:
-        system = system_of(case("flat", {"link1.angle_deg": float(row[0])}))
-        first = crossings(system.coefficients, system.contact_stiffness, system.belt_speed)[0]
-        assert first.instability == "divergence"
-        assert float(row[3]) == pytest.approx(first.friction, abs=100.0 * PRINTED)
-
-
-def test_the_page_tells_the_eigenvalues_by_the_stiffness_of_link_2() -> None:
-    rows = tables("a coarse grid:")
-    assert [float(row[0]) for row in rows] == [0.02, 0.05, 0.2, 1.0]
-    for row, (damping, column) in product(rows, ((0.0, 3), (300.0, 7))):
-        settings = {
-            "contact.stiffness": float(row[0]) * C1 / 0.1,
-            "link1.damping": damping,
-            "link2.damping": damping,
-        }
-        for simulation, eigenvalues in ((column, column + 1), (column + 2, column + 3)):
-            assert float(row[simulation]) == pytest.approx(float(row[eigenvalues]), rel=1e-3)
-        place = float(row[column + 1])
-        near = [critical("flat", {**settings, "link2.stiffness": C1 * place * part}) for part in (0.99, 1.0, 1.01)]
-        assert float(row[column + 3]) == pytest.approx(near[1], rel=2e-4)
-        assert near[0] > near[1] < near[2]
-
-
-def test_the_page_tells_the_eigenvalues_by_the_load() -> None:
-    rows = tables("](paper-load.png)")
-    assert len(rows) == 8
-    for row in (rows[2], rows[-1]):
-        assert float(row[3]) == pytest.approx(critical("rough", {"load.force": float(row[0])}), abs=PRINTED)

@@ -2,7 +2,6 @@
 
 import os
 import random
-import shutil
 import socket
 import sys
 from pathlib import Path
@@ -17,7 +16,7 @@ from brakecli.results.os_signals import guard_streams
 from tests.campaign import campaign, counts
 from tests.cli.mutator import mutated, with_another_header
 from tests.cli.test_surroundings import ODD, odd_in
-from tests.commands import TINY, brakecli, forked, lazily, left_in, shell
+from tests.commands import TINY, brakecli, forked, left_in, shell
 
 pytestmark = pytest.mark.usefixtures("compiled")
 
@@ -53,7 +52,7 @@ vx = -0.5
 """
 
 
-@pytest.mark.parametrize("number", counts(20, 1000, 5000))
+@pytest.mark.parametrize("number", counts(20, 300, 5000))
 def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
     number: int, here: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
@@ -87,7 +86,7 @@ def test_a_file_with_mistakes_is_refused_with_a_sentence_for_each_or_valid(
     assert number / 20 < codes.count(0) < number / 2
 
 
-@pytest.mark.parametrize("number", counts(3, 100))
+@pytest.mark.parametrize("number", counts(3, 30))
 def test_a_measured_file_with_another_header_is_refused_with_a_sentence_or_used(
     number: int, tmp_path: Path
 ) -> None:
@@ -128,8 +127,10 @@ def test_odd_names_and_titles_reach_no_terminal(tmp_path: Path) -> None:
 
 
 @campaign
-@pytest.mark.parametrize("ending", [".lock", ".part"])
-@pytest.mark.parametrize("kind", ["pipe", "folder", "link", "link to nothing", "second name", "socket", "text"])
+@pytest.mark.parametrize(
+    ("ending", "kind"),
+    [(".lock", "pipe"), (".lock", "second name"), (".part", "link"), (".part", "link to nothing")],
+)
 def test_what_stands_in_the_way_of_an_output_is_named_and_left_alone(
     kind: str, ending: str, tmp_path: Path
 ) -> None:
@@ -172,25 +173,3 @@ def test_every_limit_of_the_address_space_that_is_too_small_is_told(here: Path) 
     for _ in range(10):
         done = shell(f"ulimit -v {chance.randrange(100_000, 580_000)}; $B check tiny.toml", here)
         assert done.told(3, "the address space is limited to").count("\n") == 1
-
-
-@campaign
-def test_whatever_damage_a_kernel_cache_has_is_repaired(here: Path) -> None:
-    chance = random.Random(17)
-    cache = here / "cache"
-    line = ["run", "tiny.toml", "-o", "r.h5", "--force", "--json", "--quiet"]
-    brakecli(*line, cwd=here, stdin="", **lazily(cache)).told(0)
-    files = sorted(cache.rglob("*.nb?"))
-    assert files
-    kept = shutil.copytree(cache, here / "kept")
-    for _ in range(10):
-        for path in chance.sample(files, 2):
-            data = path.read_bytes()
-            at = chance.randrange(len(data))
-            noise = data[:at] + chance.randbytes(50) + data[at + 50 :]
-            bad = (b"", data[:at], chance.randbytes(len(data)), noise, noise, noise)
-            path.write_bytes(chance.choice(bad))
-        done = brakecli(*line, cwd=here, stdin="", **lazily(cache))
-        assert done.told(0) == ""  # what is damaged is compiled anew, without a word where none is wanted
-        assert done.json["steps"] == 2000
-        shutil.copytree(kept, cache, dirs_exist_ok=True)

@@ -3,49 +3,12 @@
 import random
 from pathlib import Path
 
-import h5py
-import numpy as np
 import pytest
 
 from tests.campaign import campaign
 from tests.commands import SOON, TINY, brakecli, each, left_in, shell, variants
-from tests.results.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
-
-
-def test_a_broken_result_is_no_case_to_run_again(good: Path, tmp_path: Path) -> None:
-    whole = (good / "tiny.h5").read_bytes()
-    middle = len(whole) // 2
-    files = {
-        "empty.h5": (b"", 4, "the file is empty"),
-        "text.h5": (b"[shoe]\nmass = 1\n", 4, "this is not an HDF5 file"),
-        "half.h5": (whole[:middle], 4, "its digest does not fit, so that it is damaged or was altered"),
-        "cut.h5": (whole[:-1], 4, "its digest does not fit, so that it is damaged or was altered"),
-        "flipped.h5": (whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], 4, "damaged"),
-        "flipped": (whole[:middle] + bytes([whole[middle] ^ 1]) + whole[middle + 1 :], 4, "damaged"),
-        "empty": (b"", 2, "shoe: is missing"),
-    }
-    for name, (data, _, _) in files.items():
-        (tmp_path / name).write_bytes(data)
-    with h5py.File(tmp_path / "foreign.h5", "w") as foreign:
-        foreign["x"] = np.arange(5.0)
-    for name in ("sweep.h5", "older.h5"):
-        (tmp_path / name).write_bytes(whole)
-    with edited(tmp_path / "sweep.h5") as other:
-        other.attrs["kind"] = "sweep"
-    with edited(tmp_path / "older.h5") as other:
-        other.attrs["resolved_toml"] = other.attrs["resolved_toml"].replace("mass = 10.0", "mass = -1.0")
-    expected = {name: (code, reason) for name, (_, code, reason) in files.items()} | {
-        "foreign.h5": (4, "has no digest, as another program has saved it"),
-        "sweep.h5": (4, "holds a result of kind 'sweep'"),
-        "older.h5": (4, "the case in it is not valid: "),
-        "missing.h5": (2, "missing.h5: cannot be read"),
-    }
-    done = each(tmp_path, [["run", name, "-o", "out.h5"] for name in expected])
-    for (name, (code, reason)), result in zip(expected.items(), done, strict=True):
-        result.told(code, name, reason)
-    assert not (tmp_path / "out.h5").exists()
 
 
 def test_wrong_values_are_told_all_at_once_with_their_lines(tmp_path: Path) -> None:

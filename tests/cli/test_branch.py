@@ -11,24 +11,18 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import xarray as xr
-from matplotlib.figure import Figure
 
 import brakecli
-from brakecli.analysis.branches.explore import MOST, Explorer
-from brakecli.api.inputs import load_case
 from brakecli.errors import UsageError
 from brakecli.results.field import Field, integer
 from brakecli.results.read import open_result
 from brakecli.results.stability_fields import MOTION
 from brakecli.results.write import ResultFile, new_result
-from brakecli.studies.runs.branch import line_of
-from brakecli.views.plots.branch import _line, _with_ends
 from brakecli.views.plots.result import draw
-from brakecli.views.plots.style import BLUE, DARK, VERMILION, applied
+from brakecli.views.plots.style import BLUE, DARK, applied
 from brakecli.views.render import TERMINAL
 from brakecli.views.stability import of_branch
 from brakecli.views.view import Table
-from tests.analysis.branches.phasewise import Phasewise
 from tests.analysis.shoes import Shoe
 from tests.campaign import campaign
 from tests.commands import ROOT, environment
@@ -37,10 +31,6 @@ from tests.commands import brakecli as command
 pytestmark = pytest.mark.usefixtures("compiled")
 
 FRICTION = ("--parameter", "friction.coefficient=0:1")
-
-
-def quiet(what: str, done: int, total: int) -> None:
-    """No progress."""
 
 
 def answer_of(here: Path, *words: str) -> dict[str, Any]:
@@ -150,41 +140,6 @@ def test_the_neutral_motion_at_flutter_is_not_counted_as_unstable(found: dict[st
         assert f"{len(stable)} motions beside the one at flutter, {len(stable)} of them stable" in head
 
 
-def test_two_cycles_have_a_colour_each_and_two_thresholds_a_line_each_in_the_legend(tmp_path: Path) -> None:
-    with new_result(tmp_path / "two.h5", force=False) as result:
-        about = {"kind": "branch", "parameter": "friction.coefficient", "critical": 0.6, "coexists_from": 0.3}
-        result.set_attributes(about)
-        for number, kind in enumerate(("steady sliding", "limit cycle", "limit cycle")):
-            _write_branch(result, f"branch_{number}", kind)
-        result.commit()
-    with open_result(tmp_path / "two.h5") as stored, applied():
-        upper: Any = draw(stored).axes[0]
-    artists, names = upper.get_legend_handles_labels()
-    handles = dict(zip(names, artists, strict=True))
-    assert handles["limit cycle, branch 1"].get_color() == BLUE
-    assert handles["limit cycle, branch 2"].get_color() == VERMILION
-    assert "steady sliding" in handles
-    looks = [handles[f"{text} on"] for text in ("squeals by itself from 0.6", "can vibrate from 0.3")]
-    assert looks[0]._dash_pattern != looks[1]._dash_pattern
-
-
-def test_each_branch_has_a_colour_of_its_own_and_marks_of_a_kind_do_not_lie_on_each_other(tmp_path: Path) -> None:
-    """Of eleven folds a thousandth of the width apart one is drawn, and one that is half of the width away."""
-    with new_result(tmp_path / "many.h5", force=False) as result:
-        result.set_attributes({"kind": "branch", "parameter": "friction.coefficient"})
-        for number in range(MOST):
-            folds = [*(0.2 + 0.001 * np.arange(11)), 0.7] if number == 1 else []
-            _write_branch(result, f"branch_{number}", "limit cycle" if number else "steady sliding", folds)
-        result.commit()
-    with open_result(tmp_path / "many.h5") as stored, applied():
-        figure = draw(stored)
-    upper: Any = figure.axes[0]
-    drawn = [line for line in upper.get_lines() if len(line.get_xdata()) == 2 and line.get_label()[0] == "_"]
-    assert len({line.get_color() for line in drawn}) == MOST
-    marks = [float(line.get_xdata()[0]) for line in upper.get_lines() if line.get_label() == "fold"]
-    assert marks == [0.2, 0.7]
-
-
 def test_the_legend_lies_beside_the_curves(here: Path, found: dict[str, Any]) -> None:
     for narrow in (False, True):
         with open_result(here / "branch.h5") as stored, applied(narrow):
@@ -194,19 +149,6 @@ def test_the_legend_lies_beside_the_curves(here: Path, found: dict[str, Any]) ->
         panels = [axes.get_tightbbox() for axes in figure.axes]
         assert not any(box.overlaps(panel) for panel in panels if panel)
         assert 0.0 <= box.x0 < box.x1 <= figure.bbox.x1
-
-
-def _write_branch(result: ResultFile, group: str, kind: str, folds: Sequence[float] = ()) -> None:
-    """A branch of two motions, with some folds."""
-    result.axis(group, integer("point", "number"), range(2))
-    result.set_attributes({"kind": kind}, group)
-    for name in ("value", "amplitude", "frequency", "stable"):
-        result.column(Field(name, "1", name), ("point",), [0.0, 1.0], group)
-    inner = f"{group}/special"
-    result.axis(inner, integer("special", "number"), range(len(folds)))
-    for name in ("value", "amplitude", "frequency"):
-        result.column(Field(name, "1", name), ("special",), folds, inner)
-    result.column(Field("kind", "", "kind", "S16"), ("special",), ["fold"] * len(folds), inner)
 
 
 @pytest.mark.parametrize("variable", ["", "vx"])
@@ -225,41 +167,6 @@ def test_steady_sliding_stands_at_the_foot_of_a_logarithmic_axis(
     assert len({height for each in sliding for height in each}) == 1
     assert low < sliding[0][0] < others.min()
     assert "steady sliding, amplitude 0" in [text.get_text() for text in figure.legends[0].get_texts()]
-
-
-def test_the_extent_and_the_means_of_motions_are_those_of_another_scheme(
-    here: Path, found: dict[str, Any]
-) -> None:
-    """A cubic misses (2 π / 64)^4 / 384 = 2.4e-7 of a sine; the samples of the other scheme miss more.
-
-    Those of y and vx, 40 to the fastest period, miss up to (π / 40)² / 2 = 3.1e-3 of an extreme. The mean of 400
-    samples of a motion with kinks is wrong by a part of (2 π / 400)² / 12 = 2e-5.
-    """
-    shoe = Shoe.of(tomllib.loads((here / "branch.toml").read_text()))
-    explorer = Explorer(
-        line_of(load_case(str(here / "branch.toml"), None), ("friction.coefficient",), 0.0, 1.0, "it"), quiet
-    )
-    cycles = explorer.explore().branches[1]
-    assert cycles.branch is not None
-    for place in (0, len(cycles.points) // 2, len(cycles.points) - 1):
-        motion = cycles.points[place].motion
-        cycle = cycles.branch.points[place].facts
-        other = Phasewise(replace(shoe, phi=motion.value))
-        way = other(np.array(cycle.state), cycle.period)
-        sizes = 0.5 * (way.high - way.low)
-        told = motion.extent()
-        assert told.amplitude_y == pytest.approx(sizes[1], rel=3.1e-3)
-        assert told.amplitude_vx == pytest.approx(sizes[2], rel=3.1e-3)
-        states = [np.array(cycle.state)]
-        for _ in range(400):
-            states.append(other(states[-1], cycle.period / 400).end)
-        means = np.mean(states[1:], axis=0)
-        assert told.mean_x == pytest.approx(means[0], abs=2e-5 * motion.amplitude)
-        assert told.mean_y == pytest.approx(means[1], abs=2e-5 * sizes[1])
-    for point in found["branches"][0]["points"][::8]:
-        assert (point["amplitude_y"], point["amplitude_vx"]) == (0.0, 0.0)
-        rest = replace(shoe, phi=point["value"]).rest
-        assert (point["mean_x"], point["mean_y"]) == pytest.approx((rest[0], rest[1]), rel=1e-9)
 
 
 def test_the_frequency_of_steady_sliding_does_not_jump_where_another_mode_decays_more_slowly(
@@ -288,32 +195,6 @@ def test_the_frequency_of_steady_sliding_does_not_jump_where_another_mode_decays
     assert flutter["frequency"] == pytest.approx(cycle["special"][0]["frequency"], rel=1e-3)
 
 
-def test_numbers_that_an_older_file_lacks_are_named_with_the_remedy(
-    here: Path, found: dict[str, Any], tmp_path: Path
-) -> None:
-    older = tmp_path / "older.h5"
-    with new_result(older, force=False) as result:
-        result.set_attributes({"kind": "branch", "parameter": "friction.coefficient"})
-        _write_branch(result, "branch_0", "steady sliding")
-        result.commit()
-    command("plot", "older.h5", "-o", "a.png", cwd=tmp_path).told(0)
-    command("plot", "older.h5", "-o", "b.png", "--variable", "mean", cwd=tmp_path).told(
-        2, "its branches have no mean_x, which older versions did not compute; follow them again"
-    )
-
-
-def test_a_branch_that_regains_its_stability_has_no_gap() -> None:
-    """The special point that tells where stands between two motions."""
-    columns = {"value": np.arange(4.0), "stable": np.array([0.0, 0.0, 1.0, 1.0]), "frequency": np.arange(4.0)}
-    marks = {"kind": np.array(["fold"]), "value": np.array([1.25]), "frequency": np.array([1.5])}
-    axes = Figure().subplots()
-    _line(axes, _with_ends(columns, marks), "frequency", DARK)
-    drawn: list[Any] = axes.get_lines()
-    shown = [(each.get_linestyle(), each.get_xydata().tolist()) for each in drawn]
-    ends = [[0.0, 0.0], [1.0, 1.0], [1.25, 1.5]], [[1.25, 1.5], [2.0, 2.0], [3.0, 3.0]]
-    assert shown == [("--", ends[0]), ("-", ends[1])]
-
-
 def test_the_file_is_drawn_reported_exported_and_compared(here: Path, found: dict[str, Any]) -> None:
     command("plot", "branch.h5", "-o", "a.png", cwd=here).told(0)
     command("report", "branch.h5", "-o", "a.html", cwd=here).told(0)
@@ -334,14 +215,6 @@ def test_the_same_case_gives_the_same_bytes(here: Path, found: dict[str, Any]) -
     assert (here / "again.h5").read_bytes() == (here / "branch.h5").read_bytes()
 
 
-def test_the_function_gives_the_same_branches(here: Path, found: dict[str, Any]) -> None:
-    tree = brakecli.branch(here / "branch.toml", parameter={"friction.coefficient": (0.0, 1.0)})
-    assert tree.attrs["critical"] == found["critical"]
-    assert tree["branch_1/value"].to_numpy().tolist() == [each["value"] for each in found["branches"][1]["points"]]
-    with pytest.raises(UsageError, match="two numbers"):
-        brakecli.branch(here / "branch.toml", parameter={"friction.coefficient": 3.0})  # type: ignore[dict-item]
-
-
 def test_functions_take_a_number_of_pushes(here: Path) -> None:
     case = here / "branch.toml"
     along = cast(Any, {"friction.coefficient": (0.0, 1.0)})
@@ -353,35 +226,6 @@ def test_functions_take_a_number_of_pushes(here: Path) -> None:
             brakecli.stability(case, pushes=wrong)
         with pytest.raises(UsageError, match="is no whole number from 0 to 100000"):
             brakecli.branch(case, parameter=along, pushes=wrong)
-
-
-@campaign
-def test_a_run_leads_to_its_cycle_and_one_that_is_known_is_said_to_be(here: Path, found: dict[str, Any]) -> None:
-    settings = ("--set", "friction.coefficient=0.6", "--set", "solver.duration=2.0")
-    command("run", "branch.toml", *settings, "-q", "-o", "from.h5", cwd=here).told(0)
-    again = answer_of(here, "branch", "branch.toml", *FRICTION, "--start", "from.h5")
-    assert "comes to a cycle of a branch from flutter" in again["sentence"]
-    assert len(again["branches"]) == len(found["branches"])
-    narrow = (
-        "--parameter",
-        "friction.coefficient=0.2:0.45",
-    )  # flutter lies outside, so that it leads to the branch
-    command(
-        "run",
-        "branch.toml",
-        "--set",
-        "solver.duration=20.0",
-        "--set",
-        "initial.vy=-0.01",
-        "-q",
-        "-o",
-        "hard.h5",
-        cwd=here,
-    ).told(0)
-    answer = answer_of(here, "branch", "branch.toml", *narrow, "--start", "hard.h5")
-    assert [branch["kind"] for branch in answer["branches"]] == ["steady sliding", "limit cycle"]
-    assert answer["critical"] is None
-    assert answer["coexists_from"] == 0.2
 
 
 def test_a_run_of_another_case_is_said_to_be_one(here: Path, tmp_path: Path) -> None:
@@ -534,7 +378,36 @@ def test_a_shoe_that_locks_is_said_to_lock(here: Path) -> None:
     locks = abs((c[0, 0] * (c[1, 1] + k) - c[0, 1] ** 2) / (k * c[0, 1]))
     words = ("--parameter", f"friction.coefficient=0:{1.2 * locks}")
     side = "-0.025" if c[0, 1] < 0.0 else "0.025"
-    answer = answer_of(here, "branch", "branch.toml", *words, "--set", f"wheel.angular_speed={side}")
+    answer = answer_of(
+        here, "branch", "branch.toml", *words, "--pushes", "0", "--set", f"wheel.angular_speed={side}"
+    )
     assert answer["critical"] == pytest.approx(locks, rel=1e-9)
     assert answer["sentence"].startswith(f"locks from {locks:.4g} on")
     assert [mark["kind"] for mark in answer["branches"][0]["special"]].count("divergence") == 1
+
+
+def _write_branch(result: ResultFile, group: str, kind: str, folds: Sequence[float] = ()) -> None:
+    """A branch of two motions, with some folds."""
+    result.axis(group, integer("point", "number"), range(2))
+    result.set_attributes({"kind": kind}, group)
+    for name in ("value", "amplitude", "frequency", "stable"):
+        result.column(Field(name, "1", name), ("point",), [0.0, 1.0], group)
+    inner = f"{group}/special"
+    result.axis(inner, integer("special", "number"), range(len(folds)))
+    for name in ("value", "amplitude", "frequency"):
+        result.column(Field(name, "1", name), ("special",), folds, inner)
+    result.column(Field("kind", "", "kind", "S16"), ("special",), ["fold"] * len(folds), inner)
+
+
+def test_numbers_that_an_older_file_lacks_are_named_with_the_remedy(
+    here: Path, found: dict[str, Any], tmp_path: Path
+) -> None:
+    older = tmp_path / "older.h5"
+    with new_result(older, force=False) as result:
+        result.set_attributes({"kind": "branch", "parameter": "friction.coefficient"})
+        _write_branch(result, "branch_0", "steady sliding")
+        result.commit()
+    command("plot", "older.h5", "-o", "a.png", cwd=tmp_path).told(0)
+    command("plot", "older.h5", "-o", "b.png", "--variable", "mean", cwd=tmp_path).told(
+        2, "its branches have no mean_x, which older versions did not compute; follow them again"
+    )

@@ -1,7 +1,6 @@
 """`classify` and `stability`, as their users meet them."""
 
 import json
-import math
 import re
 from pathlib import Path
 
@@ -47,20 +46,6 @@ def test_classify_repeats_the_verdict_of_the_run(here: Path) -> None:
     )
     assert {name: run.json[name] for name in shared} == {name: again.json[name] for name in shared}
     assert again.json["regime"] == "relaxation"
-
-
-def test_the_frequency_of_a_run_that_has_not_settled_says_so(here: Path, tmp_path: Path) -> None:
-    """The verdict is that of the motion to which it is continued."""
-    settings = ["--set", "solver.duration=0.2", "--set", "friction.coefficient=0.6"]
-    shown = brakecli("run", RELAXATION, *settings, "-o", "short.h5", cwd=tmp_path).out
-    numbers = brakecli("classify", "short.h5", "--json", cwd=tmp_path).json
-    assert (numbers["regime"], numbers["settled"]) == ("relaxation", 0)
-    assert f"{numbers['frequency']:.4g} Hz, not settled" in shown
-    tone = f"{numbers['frequency']:.5g}"
-    (tmp_path / "run.h5").write_bytes((here / "run.h5").read_bytes())
-    both = brakecli("classify", "short.h5", "run.h5", cwd=tmp_path).out
-    assert f"{tone}, not settled" in both
-    assert both.count("not settled") == 1
 
 
 def test_a_rough_wheel_is_asked_whether_neighbours_come_together(here: Path) -> None:
@@ -220,36 +205,9 @@ def test_files_that_are_not_results_end_in_four_and_never_in_a_number(here: Path
         assert result.out == ""
 
 
-def test_stability_reports_the_minimal_model_and_what_a_scheme_makes_of_it(here: Path) -> None:
-    changes = [
-        "--set",
-        "solver.step=0.1",
-        "--set",
-        "output.sample_interval=0.1",
-        "--set",
-        "solver.theta=[1.0, 1.0]",
-    ]
-    done = brakecli("stability", MODE_COUPLING, *changes, "--json", cwd=here)
-    assert done.json["critical_friction"] == pytest.approx(0.75, abs=1e-9)
-    assert done.json["instability"] == "flutter"
-    assert done.json["stable"] is False
-    fastest = max(done.json["eigenvalues"])
-    assert fastest == pytest.approx([0.2020717687680948, math.copysign(1.4285772641803685, fastest[1])], abs=1e-9)
-    assert done.json["discrete"]["critical_friction"] == pytest.approx(0.8115, abs=5e-5)
-
-
 def test_stability_has_no_critical_friction_on_a_standing_wheel(here: Path) -> None:
     done = brakecli("stability", RELAXATION, "--set", "wheel.angular_speed=0", "--json", cwd=here)
     assert done.json["critical_friction"] is None
-
-
-def test_stability_varies_a_key(here: Path) -> None:
-    table, numbers = each(
-        here, [["stability", RELAXATION, "--vary", "link2.angle_deg=-5:5:3", *more] for more in ([], ["--json"])]
-    )
-    assert {"critical", "friction", "of", "the", "scheme"} <= {*table.out.partition("Along ")[2].split()}
-    kinds = [entry["instability"] for entry in numbers.json["vary"]]
-    assert kinds == ["divergence", None, "flutter"]
 
 
 def test_a_force_of_the_contact_is_not_taken_for_that_of_the_spring_without_a_word(here: Path) -> None:
@@ -295,30 +253,6 @@ def test_stability_and_advise_name_both_thresholds_as_branch_does(here: Path) ->
     assert words in " ".join(table.out.split())
     assert re.search(r"search for other vibrations +640 pushes\n", table.out)
     assert "pushes" not in advised.out
-
-
-def test_fewer_pushes_may_be_asked_for_or_none(here: Path) -> None:
-    brakecli("new", "branch", "--force", cwd=here)
-    along = ["--parameter", "friction.coefficient=0:1"]
-    few, none, branch, rough = each(
-        here,
-        [
-            ["stability", "branch.toml", "--pushes", "2", "--json"],
-            ["stability", "branch.toml", "--pushes", "0"],
-            ["branch", "branch.toml", *along, "--pushes", "0", "--json"],
-            [
-                "stability",
-                "branch.toml",
-                "--set",
-                "roughness.wheel={amplitudes=[1e-9], wavelengths=[0.01]}",
-                "--json",
-            ],
-        ],
-    )
-    assert few.json["sentence"].endswith("; no other vibration found in 10 pushes")
-    assert "pushes" not in none.out
-    assert "other vibration" not in none.out + branch.json["sentence"] + rough.json["sentence"]
-    assert (branch.json["pushes"], rough.json["pushes"]) == (0, 0)
 
 
 def test_where_no_vibration_exists_below_both_names_are_null(here: Path) -> None:

@@ -210,18 +210,6 @@ def test_new_writes_a_case_that_runs(tmp_path: Path) -> None:
     assert left_in(tmp_path) == {"my wheel.toml", "my wheel.h5"}
 
 
-def test_new_takes_its_place_from_a_name_or_an_output(tmp_path: Path) -> None:
-    plain, named, placed, again, forced, empty = [
-        brakecli("new", *arguments, cwd=tmp_path)
-        for arguments in ([], ["a.toml"], ["-o", "b.txt"], [], ["--force", "--quiet"], [""])
-    ]
-    assert plain.told(0) == named.told(0) == placed.told(0) == ""
-    assert left_in(tmp_path) == {"case.toml", "a.toml", "b.txt"}
-    again.told(2, "case.toml: exists already; replace it with --force, or choose another output with -o")
-    assert forced.told(0) == forced.out == ""
-    empty.told(2, "the name is empty")
-
-
 def test_no_command_replaces_the_file_that_it_reads(tmp_path: Path) -> None:
     axis = '[[axis]]\nparameter = "load.force"\nvalues = [1.0]\n'
     texts = {"tiny.toml": TINY, "sweep.toml": 'case = "tiny.toml"\n' + axis}
@@ -267,20 +255,6 @@ def test_check_reports_cost_and_limits_and_writes_nothing(tmp_path: Path) -> Non
 
 def test_the_version_is_printed() -> None:
     assert brakecli("--version", cwd=ROOT) == Done(0, f"brakecli {__version__}\n", "")
-
-
-def test_the_citation_has_version_and_year_and_says_what_its_file_says() -> None:
-    cited = brakecli("--cite", cwd=ROOT)
-    cited.told(0)
-    assert f"version = {{{__version__}}},\n  year    = {{{__released__[:4]}}}\n" in cited.out
-    assert cited.out.count("{") == cited.out.count("}")
-    of_file = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
-    assert f"\nversion: {__version__}\ndate-released: {__released__}\n" in of_file
-    paper = re.findall(r"title: (.*)", of_file)[-1]
-    assert f"title  = {{{paper}}}" in cited.out
-    for name in ("The brakecli authors", "Koptovets", "UDC 622.625.28-592.112", "National Mining University"):
-        assert name in cited.out
-        assert name in of_file
 
 
 def test_every_command_has_help_and_a_place_in_the_documentation() -> None:
@@ -414,3 +388,17 @@ def test_a_starter_with_a_slip_in_its_name_is_asked_about(tmp_path: Path) -> Non
     assert "no starter is called scater; did you mean scatter?" in slip.err
     assert own.err == ""
     assert [each.name for each in tmp_path.iterdir()] == ["wheel7.toml"]
+
+
+def test_the_citation_has_version_and_year_and_says_what_its_file_says() -> None:
+    cited = brakecli("--cite", cwd=ROOT)
+    cited.told(0)
+    assert f"version = {{{__version__}}},\n  year    = {{{__released__[:4]}}}\n" in cited.out
+    assert cited.out.count("{") == cited.out.count("}")
+    of_file = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    assert f"\nversion: {__version__}\ndate-released: {__released__}\n" in of_file
+    paper = re.findall(r"title: (.*)", of_file)[-1]
+    assert f"title  = {{{paper}}}" in cited.out
+    for name in ("The brakecli authors", "Koptovets", "UDC 622.625.28-592.112", "National Mining University"):
+        assert name in cited.out
+        assert name in of_file

@@ -16,7 +16,7 @@ import brakecli as brakecli_in_python
 from brakecli.errors import UsageError
 from brakecli.studies.sweeps import driver
 from tests.campaign import campaign
-from tests.commands import TINY, brakecli, each, ended, forked, lazily, run, started
+from tests.commands import TINY, brakecli, each, forked, run
 from tests.results.results import edited
 
 pytestmark = pytest.mark.usefixtures("compiled")
@@ -197,20 +197,3 @@ def test_python_looks_for_the_cluster_that_the_environment_names(
     (here / "sweep.toml").write_text(SWEEP.format("tiny.toml"))
     with pytest.raises(UsageError, match="of nowhere:1"):
         brakecli_in_python.sweep(here / "sweep.toml")
-
-
-@campaign
-def test_first_runs_side_by_side_compile_once(here: Path) -> None:
-    cache = str(here / "cache")
-    with (
-        started("run", "tiny.toml", "-o", "a.h5", cwd=here, **lazily(cache)) as one,
-        started("run", "tiny.toml", "-o", "b.h5", cwd=here, **lazily(cache)) as two,
-    ):
-        told = [ended(one, 300.0).told(0), ended(two, 300.0).told(0)]
-    assert (here / "a.h5").read_bytes() == (here / "b.h5").read_bytes()
-    assert any("compiling" in said for said in told)
-    (folder,) = (here / "cache" / "brakecli").iterdir()
-    assert folder.stat().st_mode & 0o777 == 0o700
-    stems = [path.name.rpartition(".")[0] for path in folder.rglob("*.nbc")]
-    assert len(stems) == len({*stems})
-    assert all(path.name.endswith(".1.nbc") for path in folder.rglob("*.nbc"))  # a second one would be 2

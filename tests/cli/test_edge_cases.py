@@ -45,17 +45,6 @@ def test_extreme_speeds_and_frictions_end_in_a_regime_with_its_reason(here: Path
         assert not np.any(file["history/friction_force"][:])
 
 
-def test_a_reversed_wheel_of_a_symmetric_case_mirrors_the_motion(here: Path) -> None:
-    straight = ["link2.angle_deg=0.0", "initial.x=1e-5"]
-    mirrored = ["link2.angle_deg=0.0", "initial.x=-1e-5", "wheel.angular_speed=-0.1"]
-    for done in variants(here, straight, mirrored):
-        done.told(0)
-    with h5py.File(here / "0.h5") as one, h5py.File(here / "1.h5") as other:
-        assert np.ptp(one["history/x"][:]) > 0.0
-        assert np.array_equal(one["history/x"][:], -other["history/x"][:])
-        assert np.array_equal(one["history/y"][:], other["history/y"][:])
-
-
 def test_an_explicit_scheme_beyond_its_step_is_refused_with_the_limit_which_then_holds(here: Path) -> None:
     weights = "solver.theta=[0.0, 0.0]"
     coarse = ["solver.step=1e-3", "output.sample_interval=1e-3", "solver.duration=0.1"]
@@ -132,43 +121,6 @@ def test_unconverged_steps_that_do_little_harm_are_allowed_with_a_warning(here: 
     allowed.told(0, f"warning: {count} of 20 steps did not converge, as the case allows")
 
 
-def test_lost_contact_and_permanent_stick_are_named_and_never_damped(here: Path) -> None:
-    done = variants(
-        here,
-        ["load={times=[0.0, 0.005], forces=[5000.0, -5000.0]}"],  # pulled off
-        ["load.force=-5000.0"],
-        ["load.force=0.0"],
-        ["load.force=0.0", "initial.at='equilibrium'", "wheel.angular_speed=0.0"],
-        ["friction.coefficient=5.0", "wheel.angular_speed=1e-3", "load.force=50000.0"],
-        [
-            "friction.coefficient=5.0",
-            "load.force=50000.0",
-            "wheel={radius=0.5, times=[0.0, 1.0], angular_speeds=[0.0, 1e-3]}",
-        ],
-    )
-    lost, negative, unloaded, resting, carried, speeding = (result.json for result in done)
-    for numbers in (lost, negative, unloaded, resting):
-        assert numbers["regime"] == "undecided"
-        assert numbers["contact_loss_fraction"] == 1.0
-    assert "lost contact for good" in lost["reasons"][0]
-    for numbers in (negative, unloaded, resting):  # what has never touched cannot lose contact
-        assert "never" in numbers["reasons"][0]
-    assert "load: the force is negative at times" in done[1].err
-    for numbers in (carried, speeding):
-        assert numbers["regime"] == "undecided"
-        assert "sticks throughout and is carried along by the wheel" in numbers["reasons"][0]
-        assert numbers["stick_fraction"] == 1.0
-
-
-def test_a_shoe_that_a_stopping_wheel_leaves_in_stick_has_come_to_rest(here: Path) -> None:
-    stop = "wheel={radius=0.5, times=[0.0, 0.005], angular_speeds=[0.1, 0.0]}"
-    (done,) = variants(here, [stop, "friction.coefficient=5.0"])
-    (strange,) = done.told(0).splitlines()
-    assert strange.startswith("brakecli: warning: friction.coefficient: 5 is more than 2;")
-    assert done.json["regime"] == "damped"
-    assert "come to rest" in done.json["reasons"][0]
-
-
 def test_what_is_not_resolved_is_told_with_key_and_number(here: Path) -> None:
     wave = "roughness.wheel={amplitudes=[1e-6], wavelengths=[1e-3]}"
     nodes, passing = variants(
@@ -185,48 +137,6 @@ def test_what_is_not_resolved_is_told_with_key_and_number(here: Path) -> None:
         "output.sample_interval: the shortest wave of the wheel at 2e+04 Hz lies above half the sampling" in told
     )
     assert "(5000 Hz)" in told
-
-
-def test_roughness_of_no_height_is_the_smooth_path_bit_for_bit(here: Path) -> None:
-    wheel = "{amplitudes=[0.0, 0.0], wavenumbers=[300.0, 700.0]}"
-    flat = f"roughness={{shoe={{amplitudes=[0.0], wavelengths=[0.01]}}, wheel={wheel}}}"
-    empty = "roughness={shoe={amplitudes=[], wavelengths=[]}}"
-    for done in variants(here, [], [flat], [empty]):
-        assert done.told(0) == ""
-    with h5py.File(here / "0.h5") as smooth:
-        for name in ("1.h5", "2.h5"):
-            with h5py.File(here / name) as other:
-                for group in ("history", "spectrum"):
-                    assert len(smooth[group]) > 5
-                    for variable in smooth[group]:
-                        assert smooth[group][variable][:].tobytes() == other[group][variable][:].tobytes()
-                assert dict(other["evaluators"].attrs) == {"closed-form": 2000}
-
-
-def test_signals_of_nothing_and_next_to_nothing_have_finite_spectra(here: Path) -> None:
-    still = ["load.force=0.0", "initial.at='equilibrium'", "wheel.angular_speed=0.0"]
-    steady = ["friction.coefficient=0.1", "initial.at='equilibrium'"]
-    tiny = ["load.force=1e-100"]
-    tiniest = ["load.force=1e-100", "contact.stiffness=1e-60", "friction.coefficient=1e-100"]
-    damped = ["friction.coefficient=0.1", "link1.damping=1e4", "link2.damping=1e4", "solver.duration=0.2"]
-    done = variants(here, still, steady, tiny, tiniest, damped)
-    for n, result in enumerate(done):
-        assert "Traceback" not in result.err
-        assert result.code == 0
-        assert result.json["reasons"][0]
-        with h5py.File(here / f"{n}.h5") as file:
-            for variable in file["spectrum"].values():
-                assert variable.size > 3
-                assert np.isfinite(variable[:]).all()
-                assert variable[:].min() >= 0.0
-    with h5py.File(here / "0.h5") as file:
-        assert not np.any(file["history/x"][:])
-        assert not np.any(file["spectrum/vx"][:])
-    assert (done[0].json["spectrum_peak"], done[1].json["spectrum_peak"]) == (
-        None,
-        None,
-    )  # of rounding there is none
-    assert done[1].json["regime"] == "damped"
 
 
 @pytest.mark.parametrize(

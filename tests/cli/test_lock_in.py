@@ -1,7 +1,6 @@
 """`stability --vary`, its files and its picture, as their users meet them."""
 
 import csv
-import math
 from importlib import import_module
 from pathlib import Path
 
@@ -80,13 +79,6 @@ def test_the_picture_shows_both_modes_and_where_stability_changes(here: Path) ->
     assert below.get_xlabel() == "friction.coefficient"
     told = brakecli("classify", "d.h5", cwd=here).told(4, "holds a result of kind 'stability'")
     assert told.count("\n") == 1
-
-
-def test_the_minimal_model_grows_as_published(here: Path) -> None:
-    line = ["stability", MODE_COUPLING, "--vary", "friction.coefficient=1:1:1", "--json"]
-    (entry,) = brakecli(*line, cwd=here).json["vary"]
-    assert entry["growth_rates"] == pytest.approx([0.2020717687680948, -0.2020717687680948], abs=1e-12)
-    assert entry["frequencies"] == pytest.approx([1.4285772641803685 / (2.0 * math.pi)] * 2, abs=1e-12)
 
 
 def test_values_without_steady_sliding_are_gaps_and_the_ends_of_sliding_are_marked(here: Path) -> None:

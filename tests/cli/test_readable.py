@@ -185,7 +185,7 @@ def without_advice(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("without_advice")
-@pytest.mark.parametrize("number", counts(25, 100, 600))
+@pytest.mark.parametrize("number", counts(8, 30, 600))
 def test_every_reader_reads_what_was_written(tmp_path: Path, number: int) -> None:
     chance = random.Random(number)
     read = 0
@@ -200,7 +200,8 @@ def test_every_reader_reads_what_was_written(tmp_path: Path, number: int) -> Non
 
 @pytest.mark.usefixtures("without_advice")
 @pytest.mark.parametrize(
-    "path", [pytest.param(each, marks=[campaign] * (each.stem == "chaos"), id=each.stem) for each in FOUND]
+    "path",
+    [pytest.param(each, marks=[campaign] * (each.stem != "stop-nofrequency"), id=each.stem) for each in FOUND],
 )
 def test_what_once_was_unreadable_is_read(tmp_path: Path, path: Path) -> None:
     shutil.copy(path, tmp_path / "c.toml")

@@ -146,9 +146,3 @@ def test_an_address_space_too_small_to_compile_is_told_and_compiled_kernels_work
     small = "ulimit -v 1055000; $B run tiny.toml -q --force"
     shell(small, here).told(0)
     shell(small, here, **lazily(here / "empty")).told(3, "compiling kernels needs 1430 MB", "ulimit -v unlimited")
-
-
-@campaign
-def test_an_address_space_that_is_just_large_enough_is(here: Path) -> None:
-    for command in ("run tiny.toml", "compare-schemes tiny.toml --budget 1"):  # the second compiles every scheme
-        shell(f"ulimit -v 1400000; $B {command} -q", here, **lazily(here)).told(0)

@@ -56,6 +56,7 @@ def test_a_run_that_is_kept_is_the_same_and_has_the_form_of_a_result(
     assert [path.name for path in tmp_path.iterdir()] == ["kept.h5"]
 
 
+@campaign
 def test_every_command_reads_what_is_kept(tree: Any, tmp_path: Path) -> None:
     tree.brakecli.save(tmp_path / "kept.h5")
     found = command("info", "kept.h5", "--json", cwd=tmp_path).json
@@ -99,20 +100,6 @@ def test_what_was_changed_is_kept_as_it_is_now(tree: Any, tmp_path: Path) -> Non
     with open_result(tmp_path / "part.h5") as result:
         assert result.variables("history")["power"].attributes == {"units": "W", "long_name": "power"}
         assert result.variables("history")["x"].shape == (50,)
-
-
-def test_numbers_of_points_may_be_missing_and_an_axis_without_values_is_numbered(
-    folder: Path, tmp_path: Path
-) -> None:
-    found = KINDS["sweep"](folder / "tiny.toml")
-    found["shares"] = (("friction_coefficient", "part"), [[0.25, np.nan], [np.inf, -1.0]])
-    found["words"] = ("friction_coefficient", ["ä", ""])
-    found.brakecli.save(tmp_path / "kept.h5")
-    again = brakecli.load(tmp_path / "kept.h5").to_dataset()
-    np.testing.assert_array_equal(again.shares, [[0.25, np.nan], [np.nan, -1.0]])
-    assert again.part.values.tolist() == [0, 1]
-    assert again.words.values.tolist() == ["ä", ""]
-    xr.testing.assert_identical(again.drop_vars(["shares", "part", "words"]), found.drop_vars(["shares", "words"]))
 
 
 def with_a_gap(tree: Any) -> Any:

@@ -17,18 +17,14 @@ STARTERS = ("case", "rough", "stop", "sweep", "hysteresis", "branch", "scatter")
 SHORT = ("--set", "samples=128")
 LINES = [
     ["run", "case.toml"],
-    ["run", "rough.toml"],
     ["run", "stop.toml"],
-    ["classify", "case.h5"],
     ["classify", "rough.h5"],
     ["classify", "stop.h5"],
     ["stability", "case.toml"],
-    ["stability", "rough.toml"],
     ["stability", "case.toml", "--vary", "link2.angle_deg=1:10:10"],
     ["advise", "case.toml"],
     ["advise", "rough.toml"],
     ["sweep", "sweep.toml"],
-    ["sweep", "hysteresis.toml"],
     ["scatter", "scatter.toml", *SHORT],
     ["diff", "case.h5", "rough.h5"],
 ]

@@ -118,38 +118,6 @@ def test_curves_are_the_numbers_of_the_file_in_both_panels(tmp_path: Path) -> No
     assert figure.axes[0].get_xlabel() == "median time of the loop (ms)"
 
 
-def test_what_is_best_and_what_was_asked_for_have_colours_and_the_rest_is_grey(tmp_path: Path) -> None:
-    found = curves(drawn(write(tmp_path / "r.h5")).axes[0])
-    looks = {label: (curve.get_color(), curve.get_marker()) for label, curve in found.items()}
-    assert len({looks[label] for label in OTHERS}) == 1
-    assert len({looks[label] for label in (BEST, ASKED, OTHERS[0])}) == 3
-    assert all(found[label].get_zorder() > found[OTHERS[0]].get_zorder() for label in (BEST, ASKED))
-
-
-def test_where_no_entry_meets_the_target_the_whole_front_has_names(tmp_path: Path) -> None:
-    place = np.arange(len(METHODS) * RUNGS) // RUNGS
-    changed = {"on_front": (place == 1).astype(int)}
-    axes = drawn(write(tmp_path / "r.h5", changed, target_error=1e-9)).axes[0]
-    assert line(axes, [*METHODS][1]).get_color() != line(axes, BEST).get_color()
-
-
-def test_front_target_and_recommendation_are_marked(tmp_path: Path) -> None:
-    values = columns()
-    figure = drawn(write(tmp_path / "r.h5"))
-    left, right = figure.axes
-    front = line(left, "no other is better in both")
-    np.testing.assert_allclose(front.get_xdata(), 1e3 * values["wall_seconds"][:RUNGS], rtol=1e-12)
-    np.testing.assert_array_equal(front.get_ydata(), values["error"][:RUNGS])
-    for axes in (left, right):
-        assert set(line(axes, "target 0.01").get_ydata()) == {1e-2}
-        assert line(axes, "recommended").get_ydata() == [values["error"][2]]
-    assert line(left, "recommended").get_xdata() == [pytest.approx(1e3 * values["wall_seconds"][2])]
-    assert "cheapest of error ≤ 0.01: two-layer (1/2, 1/2), step 2.5e-06 s" in figure.texts[1].get_text()
-    named = [BEST, f"{ASKED}, of the case"]
-    marks = ["target 0.01", "recommended", "no other is better in both", "other methods"]
-    assert legend(figure) == [*named, *marks]
-
-
 def test_the_legend_covers_no_panel(tmp_path: Path) -> None:
     with applied():
         figure = drawn(write(tmp_path / "r.h5"))
@@ -173,15 +141,6 @@ def test_what_is_missing_or_no_result_any_more_leaves_a_gap(tmp_path: Path) -> N
         np.testing.assert_array_equal(np.isnan(x), np.isnan(y))
     assert figure.axes[0].get_ylim()[1] < 10.0 * LARGEST
     assert "failed 1" in figure.texts[2].get_text()
-
-
-def test_order_one_and_two_are_drawn_beside_the_curves(tmp_path: Path) -> None:
-    axes = drawn(write(tmp_path / "r.h5")).axes[1]
-    lines = [np.array(each.get_xydata()) for each in axes.get_lines()]
-    guides = [np.log(xy) for xy in lines if len(xy) == 2 and xy[0, 0] > 2.0]  # the target spans 0 to 1
-    slopes = [np.diff(xy[:, 1])[0] / np.diff(xy[:, 0])[0] for xy in guides]
-    np.testing.assert_allclose(slopes, [-1.0, -2.0], rtol=1e-9)
-    assert [text.get_text() for text in axes.texts] == ["order 1", "order 2"]
 
 
 def test_errors_that_the_reference_cannot_tell_are_shaded(tmp_path: Path) -> None:

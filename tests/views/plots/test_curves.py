@@ -1,14 +1,10 @@
 """Pictures of sweeps over one axis: curves hold the numbers of the file, and every point has its sign."""
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from brakecli.views.plots.style import DARK, applied
 from tests.campaign import campaign
-from tests.studies.sweeps.helpers import axis
-from tests.studies.sweeps.made_up import CYCLE, DAMPED, swept
 from tests.views.plots.helpers import (
     ANGLE,
     CRITICAL,
@@ -36,19 +32,6 @@ def test_critical_values_and_their_error_bars_are_those_of_the_file(tmp_path: Pa
     np.testing.assert_allclose(bars.mean(axis=1)[:, 1], -1e-4 * np.arange(8), atol=1e-15)
     assert below.get_xlabel() == "link2.angle_deg (deg)"
     assert axes.get_ylabel() == "critical friction.coefficient"
-
-
-def test_error_bars_are_drawn_where_they_reach_beyond_their_dots(tmp_path: Path) -> None:
-    """Critical values fill 0.07 of an axis some 5 inches high: dots of 6.5/72 inch hide errors below 7e-4."""
-    values = columns((8,), critical=True)
-    values["critical_error"] = np.where(np.arange(8) < 5, 1e-4, 5e-3)
-    result = write(tmp_path / "r.h5", {"axis": [ANGLE], "critical": CRITICAL}, values)
-    axes = panels(result)[0]
-    (container,) = axes.containers
-    bars = np.array(container.lines[2][0].get_segments())
-    np.testing.assert_array_equal(bars[:, 0, 0], [6.0, 7.0, 8.0])
-    np.testing.assert_allclose(np.ptp(bars[:, :, 1], axis=1), 1e-2, rtol=1e-9)
-    assert {"error bar", "errors up to 10⁻⁴ lie within the dots"} < set(legend(drawn(result)))
 
 
 @campaign
@@ -89,17 +72,6 @@ def test_a_search_by_eigenvalues_alone_has_no_error_bars(tmp_path: Path) -> None
     assert legend(figure) == ["by eigenvalues"]
 
 
-@campaign
-def test_a_search_that_no_run_measured_is_not_called_a_simulation(tmp_path: Path) -> None:
-    values = columns((8,), critical=True)
-    values["critical"] = values["critical_eigenvalue"]
-    values["critical"][3] = values["critical_eigenvalue"][3] = np.nan
-    result = write(tmp_path / "r.h5", {"axis": [ANGLE], "critical": CRITICAL}, values)
-    assert len(panels(result)) == 1
-    assert {"critical value", "by eigenvalues"} < set(legend(drawn(result)))
-    assert "by simulation" not in legend(drawn(result))
-
-
 def test_every_point_has_the_colour_of_its_regime(tmp_path: Path) -> None:
     values = columns((8,), critical=False)
     values["status"][5] = "failed"
@@ -118,18 +90,6 @@ def test_every_point_has_the_colour_of_its_regime(tmp_path: Path) -> None:
     assert "forced by the wheel's waves" in legend(drawn(result))
 
 
-def test_what_waves_force_is_drawn_below_what_the_shoe_adds(tmp_path: Path) -> None:
-    values = columns((8,), critical=False)
-    values["excitation"][2] = "forced"
-    values["amplitude_forced"] = np.where(np.arange(8) == 5, 2e-6, np.nan)
-    amplitude, frequency = panels(write(tmp_path / "r.h5", {"axis": [ANGLE]}, values))
-    dots = [each for each in amplitude.get_lines() if each.get_mfc() == DARK and len(each.get_xdata())]
-    (drawn_dots,) = dots
-    expected = [[3.0, 1e6 * values["amplitude"][2]], [6.0, 2.0]]  # a motion that is only forced, and a part
-    np.testing.assert_allclose(drawn_dots.get_xydata(), expected)
-    assert not [each for each in frequency.get_lines() if each.get_mfc() == DARK and len(each.get_xdata()) > 1]
-
-
 def test_both_ways_are_curves_of_their_own_and_their_difference_is_shaded(tmp_path: Path) -> None:
     differ = np.array([0, 0, 1, 1, 0, 0, 0, 0])
     table = {"axis": [{**ANGLE, "direction": "both"}]}
@@ -144,40 +104,3 @@ def test_both_ways_are_curves_of_their_own_and_their_difference_is_shaded(tmp_pa
     assert bands == [[2.5, 3.5], [3.5, 4.5]]
     one_way = gathered(result, ["direction=down"])
     np.testing.assert_array_equal(one_way["amplitude"], picture["amplitude"][1:])
-
-
-def test_a_long_legend_takes_more_rows_and_stays_inside_the_figure(tmp_path: Path) -> None:
-    values = columns((2, 8), critical=False)
-    values["status"][:, 5] = "failed"
-    values["excitation"][:, 2] = "forced"
-    table = {"axis": [{**ANGLE, "direction": "both"}]}
-    figure = drawn(write(tmp_path / "r.h5", table, {**values, "hysteresis": np.arange(8) % 2}))
-    with applied():
-        figure.draw_without_rendering()
-    (found,) = figure.legends
-    assert len(legend(figure)) == 9
-    assert found.get_window_extent().x1 <= figure.bbox.x1
-    assert found.get_window_extent().y0 > figure.axes[0].get_window_extent().y1
-
-
-@campaign
-def test_curves_over_initial_states_have_the_colours_of_their_attractors(tmp_path: Path) -> None:
-    """So have those of a list over one key, whose points are drawn in the order of its values."""
-    made = [CYCLE, {**CYCLE, "amplitude": 2e-5}, DAMPED, {**CYCLE, "settled": 0}, CYCLE]
-    (tmp_path / "plan.csv").write_text("initial.vx\n0.3\n0.1\n-0.2\n0.2\n0\n")
-    values = axis("initial.vx", "values = [0.3, 0.1, -0.2, 0.2, 0.0]")
-    for table in (values, 'points = "plan.csv"'):
-        swept(tmp_path, made, table)
-        figure = drawn(tmp_path / "s.h5")
-        (curve,) = [each for each in figure.axes[0].get_lines() if each.get_color() == "#777777"]
-        shown = np.array(curve.get_xydata())
-        np.testing.assert_allclose(shown, [[-0.2, np.nan], [0.0, 10], [0.1, 20], [0.2, 10], [0.3, 10]])
-        assert legend(figure) == [
-            "1: damped, 20.0% of the points",
-            "2: relaxation, 100 Hz, 10 µm, 40.0% of the points",
-            "3: relaxation, 100 Hz, 20 µm, 20.0% of the points",
-            "no attractor known",
-        ]
-        lines: list[Any] = figure.axes[0].get_lines()
-        drawn_ones = [places for each in lines if (places := np.round(each.get_xydata(), 9).tolist())]
-        assert drawn_ones[2:5] == [[[0.0, 10.0], [0.3, 10.0]], [[0.1, 20.0]], [[0.2, 10.0]]]

@@ -9,18 +9,15 @@ import pytest
 from brakecli.results.read import open_result
 from brakecli.views.plots.result import draw
 from brakecli.views.plots.style import applied
-from tests.campaign import campaign
 from tests.studies.sweeps.helpers import axis
 from tests.studies.sweeps.made_up import CYCLE, DAMPED, swept
 from tests.views.plots.helpers import (
     ANGLE,
     CRITICAL,
     REGIMES,
-    SCHEME,
     SPEED,
     columns,
     drawn,
-    gathered,
     legend,
     panels,
     points,
@@ -47,19 +44,6 @@ def test_maps_hold_the_values_of_their_cells(tmp_path: Path) -> None:
     np.testing.assert_allclose(
         amplitude.collections[0].get_array().reshape(7, 8).T, 1e6 * values["amplitude"], rtol=1e-12
     )
-
-
-@campaign
-def test_a_short_third_axis_stands_side_by_side(tmp_path: Path) -> None:
-    for critical in ({}, {"critical": CRITICAL}):
-        figure = drawn(write(tmp_path / "r.h5", {"axis": [SPEED, SCHEME, ANGLE], **critical}))
-        titles = [axes.get_title(loc="left") for axes in figure.axes]
-        assert titles[:2] == ["solver.scheme = two-layer", "solver.scheme = three-layer"]
-        shown = figure.axes[:2] if critical else figure.axes[2:4]
-        assert [axes.get_xlabel() for axes in shown] == ["wheel.angular_speed (rad/s)"] * 2
-    picture = gathered(tmp_path / "r.h5", ["solver.scheme=three-layer", "link2.angle_deg=3"])
-    np.testing.assert_array_equal(picture["critical"][0], columns((7, 2, 8), critical=True)["critical"][:, 1, 2])
-    assert picture.chosen == ("solver.scheme = three-layer", "link2.angle_deg = 3 deg")
 
 
 def test_each_attractor_has_a_colour_of_its_own_in_grey_as_well(tmp_path: Path) -> None:
@@ -135,21 +119,3 @@ def test_listed_points_are_dots_in_the_plane_of_the_first_two_keys_that_vary(tmp
     assert sorted(map(tuple, amplitude.collections[0].get_offsets().tolist())) == [places[1], places[3]]
     np.testing.assert_array_equal(points(amplitude, "failed"), [places[3]])
     assert "at different shoe.mass" in [text.get_text() for text in figure.texts]
-
-
-def test_listed_starts_have_the_colours_of_their_attractors(tmp_path: Path) -> None:
-    starts = "initial.x, initial.vy\n1e-5, 0.2\n-1e-5, 0.1\n0, 0\n"
-    figure = listed(tmp_path, starts, [CYCLE, DAMPED, {**CYCLE, "settled": 0}])
-    attractor = figure.axes[0]
-    assert attractor.get_title(loc="left") == "Attractor"
-    assert dots(attractor) == {(1e-5, 0.2): 2.0, (-1e-5, 0.1): 1.0}
-    np.testing.assert_array_equal(points(attractor, "no attractor known"), [[0.0, 0.0]])
-
-
-def test_critical_values_of_listed_points_are_the_colours_of_dots(tmp_path: Path) -> None:
-    search = '[critical]\nparameter = "friction.coefficient"\nlower = 0.0\nupper = 2.0\nmethod = "eigenvalue"\n'
-    made = [{"critical_status": "found", "critical": value} for value in (0.3, 0.5)]
-    made += [{"critical_status": "stable throughout", "critical": np.nan}]
-    axes, _ = listed(tmp_path, "shoe.mass, link2.angle_deg\n1, 30\n2, 20\n3, 25\n", made, search).axes
-    assert dots(axes) == {(1.0, 30.0): 0.3, (2.0, 20.0): 0.5}
-    np.testing.assert_array_equal(points(axes, "stable up to 2"), [[3.0, 25.0]])

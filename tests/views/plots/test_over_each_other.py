@@ -11,7 +11,6 @@ from brakecli.errors import UsageError
 from brakecli.results.read import open_result
 from brakecli.studies.runs.run import run
 from brakecli.views.plots import over_each_other, style
-from brakecli.views.plots.run import RunPicture
 from tests.campaign import campaign
 from tests.commands import TINY
 from tests.views.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
@@ -40,23 +39,6 @@ def test_the_last_cycles_of_both_runs_are_drawn_as_they_are_stored(tmp_path: Pat
     assert detail.get_ylabel() == "velocity ẋ (mm/s)"
     assert len(spectra.get_lines()) == 2
     assert whole.get_xlim() == (0.0, 0.02)
-
-
-def test_the_last_part_of_both_is_as_long_as_the_shorter_one(tmp_path: Path) -> None:
-    """What has no line, as a damped motion, is shown for longer: twelve cycles of the other would be a block."""
-    names = [tmp_path / "a.h5", tmp_path / "b.h5"]
-    parts = []
-    for name, friction in zip(names, (0.0, 0.7), strict=True):
-        changes = [f"friction.coefficient={friction}", "solver.duration=0.5"]
-        run(parse_case(TINY, "tiny", changes), name, force=False)
-        with open_result(name) as result:
-            parts.append(RunPicture(result, "vx").detail["time"])
-    detail = picture(names).axes[0]
-    assert len(parts[0]) != len(parts[1])
-    begin = max(time[0] for time in parts)
-    assert detail.get_xlim() == (begin, parts[0][-1])
-    for line in detail.get_lines():
-        assert np.asarray(line.get_xdata())[[0, -1]] == pytest.approx([begin, parts[0][-1]])
 
 
 def test_the_critical_values_of_two_sweeps_are_drawn_along_their_axis(tmp_path: Path) -> None:

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from matplotlib.figure import Figure
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
@@ -94,18 +93,6 @@ def run_command(monkeypatch: pytest.MonkeyPatch) -> Callable[..., int]:
     return run
 
 
-def test_numbers_at_ticks_are_texts_and_no_formulas() -> None:
-    """A formula takes 5 ms to be read, and each of them is read anew in every picture."""
-    with style.applied():
-        figure = Figure()
-        axes = figure.subplots()
-        axes.semilogy([-0.1, 0.2], [1e-3, 1e1])
-        style.rendered(figure, ".png")
-    texts = [text.get_text() for axis in (axes.xaxis, axes.yaxis) for text in axis.get_majorticklabels()]
-    assert {"10⁻²", "−0.05"} <= {*texts}
-    assert not any("$" in text for text in texts)
-
-
 @campaign
 def test_each_suffix_gives_a_whole_picture_of_its_kind_and_the_same_bytes_again(tmp_path: Path) -> None:
     result = write(tmp_path / "r.h5", sine(2000), frequency=1.0)
@@ -170,28 +157,6 @@ def test_envelope_is_the_least_and_greatest_value_of_each_column(
     assert max(asked) <= 333
 
 
-@pytest.mark.parametrize("samples", [1, *(pytest.param(n, marks=campaign) for n in (2, 3, 160))])
-@campaign
-def test_a_history_of_few_samples_is_drawn(samples: int, tmp_path: Path) -> None:
-    still = {"x": np.zeros(samples), "vx": np.zeros(samples), "state": np.full(samples, 2)}
-    for number, moved in enumerate((still, sine(samples))):
-        attributes = {"status": "failed", "regime": "undecided", "failure": "t = 0 s: it broke; mend it"}
-        result = write(tmp_path / f"{number}.h5", moved, **attributes)
-        plot_result(result, tmp_path / f"{number}.png", force=False)
-        with open_result(result) as stored:
-            picture = RunPicture(stored)
-        assert picture.detail["time"].size == samples
-        assert picture.summary == "failed at t = 0 s: it broke"
-
-
-@pytest.mark.parametrize("scale", [1e-300, 1e149, *(pytest.param(s, marks=campaign) for s in (0.0, 1e-12, 1e9))])
-@campaign
-def test_motions_of_any_size_are_drawn(scale: float, tmp_path: Path) -> None:
-    moved = {"x": scale * sine(500)["x"], "vx": scale * sine(500)["vx"], "state": np.full(500, 1)}
-    plot_result(write(tmp_path / "r.h5", moved), tmp_path / "r.png", force=False)
-    assert imread(tmp_path / "r.png").shape == (1080, 1560, 4)
-
-
 def test_a_settled_motion_shows_its_last_twelve_cycles(tmp_path: Path) -> None:
     picture = gathered(tmp_path / "r.h5", sine(5000, 2.0), frequency=2.0)
     assert picture.detail["time"].size * INTERVAL * 2.0 == pytest.approx(12.0)
@@ -204,22 +169,6 @@ def test_a_motion_that_comes_to_rest_is_shown_until_it_rests(tmp_path: Path) -> 
     moved["state"][6999] = 1
     picture = gathered(tmp_path / "r.h5", moved, spectrum_peak=2.0, excitation="none")
     assert picture.detail["time"][0] < 6999 * INTERVAL < picture.detail["time"][-1] < 7100 * INTERVAL
-
-
-def test_the_wheel_is_drawn_with_the_speed_of_the_case(tmp_path: Path) -> None:
-    changing = "wheel={radius=0.5, times=[1.0, 3.0], angular_speeds=[2.0, 0.0]}"
-    picture = gathered(tmp_path / "r.h5", sine(500), changing)
-    expected = 1.0 - 0.5 * np.clip(picture.detail["time"] - 1.0, 0.0, 2.0)
-    np.testing.assert_allclose(picture.detail["belt"], expected, atol=1e-12)
-
-
-def test_lines_stand_where_the_waves_of_a_steady_wheel_pass(tmp_path: Path) -> None:
-    waves = "roughness.wheel={amplitudes=[1e-6, 1e-6], wavelengths=[0.1, 0.5]}"
-    assert gathered(tmp_path / "r.h5", sine(500), waves).passing == pytest.approx((2.0, 10.0))
-    numbers = "roughness.wheel={amplitudes=[1e-6], wavenumbers=[6.283185307179586]}"
-    assert gathered(tmp_path / "r.h5", sine(500), numbers).passing == pytest.approx((1.0,))
-    changing = "wheel={radius=0.5, times=[1.0, 3.0], angular_speeds=[2.0, 0.0]}"
-    assert gathered(tmp_path / "r.h5", sine(500), waves, changing).passing == ()
 
 
 @campaign
@@ -243,14 +192,6 @@ def test_each_quantity_of_the_history_can_be_drawn(tmp_path: Path) -> None:
             np.testing.assert_allclose(np.asarray(lines.get_ydata()), moved[ordinate][-len(curve) :], rtol=1e-12)
     with pytest.raises(UsageError, match="give one of x, y, vx"):
         plot_result(result, tmp_path / "r.png", force=False, variable="state")
-
-
-def test_modes_of_the_case_stand_in_the_spectrum(tmp_path: Path) -> None:
-    """Upright links couple nothing: the modes are those of one spring, and of the other with the contact's 2ak."""
-    picture = gathered(tmp_path / "r.h5", sine(500))
-    expected = np.sqrt([1.0, 1.0 + 2e6]) / (2.0 * np.pi)
-    assert picture.modes == pytest.approx(expected, rel=1e-12)
-    assert f"mode {expected[0]:.4g} Hz" in drawn_labels(picture)
 
 
 def drawn_labels(picture: RunPicture) -> list[str]:

@@ -93,30 +93,6 @@ def test_dots_that_spread_fill_the_axes_and_others_stand_on_the_whole_motion(
         assert ((limits[:, 0] < filling.min(axis=0)) & (filling.max(axis=0) < limits[:, 1])).all()
 
 
-def test_the_states_at_the_waves_are_those_between_the_samples(runs: dict[str, Path]) -> None:
-    """A forced linear motion is a sine: what it is after whole periods follows from a fit to its samples."""
-    with open_result(runs["forced"]) as result:
-        turns = 2.0 * np.pi * FREQUENCY * result.read("history", "time")[-1000:]
-    basis = np.column_stack([np.cos(turns), np.sin(turns), np.ones_like(turns)])
-    for axes in section(runs["forced"], "wave"):
-        curve = points(axes, "motion")[-1000:]
-        dot = points(axes, "section")[-1]
-        (cosines, _, means), *_ = np.linalg.lstsq(basis, curve, rcond=None)
-        assert (np.abs(dot - cosines - means) < 1e-4 * np.ptp(curve, axis=0)).all()
-
-
-def test_dots_and_motion_are_those_of_the_same_time(
-    runs: dict[str, Path], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """The last 0.1 s of 0.5 s: six or seven periods of the wave, and as many turns of the grey curve."""
-    with open_result(runs["forced"]) as result:
-        samples = round(0.1 * (len(result.read("history", "time")) - 1) / 0.5)
-    monkeypatch.setattr(sections, "MOST", samples)
-    for axes in section(runs["forced"], "wave"):
-        assert len(points(axes, "motion")) == samples
-        assert len(points(axes, "section")) == pytest.approx(0.1 * FREQUENCY, abs=1.0)
-
-
 TORUS = "with a phase of its own (a torus: 173 Hz and the frequencies of the waves are incommensurate)"
 
 
@@ -134,24 +110,6 @@ def test_the_verdict_stands_above_the_section(
         shown = " ".join(text.get_text() for text in draw(result, section="wave").findobj(Text))
     assert words in shown
     assert TORUS.replace(" ", "") in shown.replace(" ", "")
-
-
-@pytest.mark.parametrize(
-    ("wavelengths", "words"),
-    [([0.03, 0.017], "together every 17 dots"), ([0.03], ""), ([0.03, 0.017 * 2**0.5], "")],
-)
-def test_after_how_many_dots_the_waves_repeat_is_said(
-    wavelengths: list[float], words: str, tmp_path: Path
-) -> None:
-    """30 and 17 mm: 17 waves of 30 mm are 30 waves of 17 mm, and no fewer fit."""
-    wheel = {"amplitudes": [2e-6, 1e-6][: len(wavelengths)], "wavelengths": wavelengths}
-    case = {**FORCED, "roughness": {"wheel": wheel}, "solver": {"step": 1e-5, "duration": 0.1}}
-    run(parse_case(tomli_w.dumps(case), "case.toml"), tmp_path / "a.h5", force=False)
-    with open_result(tmp_path / "a.h5") as result, applied():
-        shown = " ".join(text.get_text() for text in draw(result, section="wave").findobj(Text))
-    assert "at each wave of 66.67 Hz" in shown
-    assert words in shown
-    assert ("repeat together" in shown) == bool(words)
 
 
 @campaign

@@ -1,8 +1,5 @@
 """Pictures of sweeps: what they show is what the result holds, and what cannot be drawn is refused."""
 
-import math
-from collections.abc import Callable
-from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -10,12 +7,10 @@ import numpy as np
 import pytest
 import tomli_w
 from matplotlib.colors import to_rgb
-from matplotlib.contour import ContourSet
 from matplotlib.image import imread
 from numpy.typing import NDArray
 
 from brakecli.case.case import resolved_toml
-from brakecli.case.read import parse_case
 from brakecli.errors import UnreadableResultError, UsageError
 from brakecli.results.read import open_result
 from brakecli.results.write import new_result
@@ -24,7 +19,7 @@ from brakecli.studies.sweeps.plan import parse_sweep
 from brakecli.studies.sweeps.workers.task import compute_units
 from brakecli.views.plots.axis import Axis
 from brakecli.views.plots.result import draw, plot_result
-from brakecli.views.plots.style import applied, headed, prefixed, readable, rendered
+from brakecli.views.plots.style import applied, prefixed, readable
 from brakecli.views.plots.sweep import REGIMES
 from tests.campaign import campaign
 from tests.examples import NEVER_STABLE, SQUEAL, make
@@ -182,37 +177,6 @@ def test_units_are_those_that_a_person_would_choose() -> None:
     assert stiff.named(7) == "link2.stiffness = 40 MN/m"
 
 
-@campaign
-def test_numbers_at_ticks_stand_apart(tmp_path: Path) -> None:
-    long = {"parameter": "friction.coefficient", "values": [0.123456 + 0.1 * place for place in range(6)]}
-    five = {"parameter": "wheel.radius", "values": [0.1, 0.2, 0.3, 0.4, 0.5]}
-    figure = drawn(write(tmp_path / "r.h5", {"axis": [long, ANGLE, five]}))
-    with applied():
-        rendered(figure, ".png")
-        figure.draw_without_rendering()
-    checked = 0
-    for axes in figure.axes:
-        shown = [tick.label1 for tick in axes.xaxis.get_major_ticks() if tick.label1.get_visible()]
-        boxes = [text.get_window_extent() for text in shown if text.get_text()]
-        for before, after in pairwise(sorted(boxes, key=lambda box: box.x0)):
-            assert before.x1 < after.x0
-            checked += 1
-    assert checked >= 5
-
-
-@pytest.mark.parametrize(("width", "count"), [(0.1, 5), (1e-4, 9), (1.0, 9)])
-@campaign
-def test_ticks_tell_apart_values_that_differ_little_about_a_large_one(
-    width: float, count: int, tmp_path: Path
-) -> None:
-    near = {"parameter": "link1.stiffness", "start": 1e6, "stop": 1e6 + width, "num": count}
-    figure = drawn(write(tmp_path / "r.h5", {"axis": [near]}))
-    with applied():
-        rendered(figure, ".png")
-    texts = [text.get_text() for text in figure.axes[-1].get_xticklabels()]
-    assert len({*texts}) == len(texts) >= 2
-
-
 def test_regimes_differ_in_grey_and_cells_without_a_number_are_explained(tmp_path: Path) -> None:
     shades = sorted(float(np.dot((0.299, 0.587, 0.114), to_rgb(colour))) for colour, _ in REGIMES.values())
     assert np.diff(shades).min() > 0.1
@@ -223,67 +187,9 @@ def test_regimes_differ_in_grey_and_cells_without_a_number_are_explained(tmp_pat
     assert len(found) == np.isnan(columns((8, 7), critical=False)["frequency"]).sum()
 
 
-def test_no_power_of_ten_stands_at_the_end_of_an_axis_and_no_dot_at_that_of_a_line() -> None:
-    with applied():
-        figure = headed(5.0, 4.0, "A title", "   ·   ".join(["a part of the heading"] * 5))
-        axes = figure.subplots()
-        axes.plot([0.0, 3e-20], [0.0, 2e15])
-        rendered(figure, ".png")
-    assert [axis.get_offset_text().get_text() for axis in (axes.xaxis, axes.yaxis)] == ["", ""]
-    assert "2·10¹⁵" in [text.get_text() for text in axes.get_yticklabels()]
-    assert len(figure.texts) > 2
-    assert not any(text.get_text().endswith("·") for text in figure.texts)
-
-
-@campaign
-def test_any_number_of_a_sweep_is_drawn(tmp_path: Path) -> None:
-    values = columns((8, 7), critical=True)
-    values["steps"] = np.arange(56).reshape(8, 7)
-    for critical in ({}, {"critical": CRITICAL}):
-        result = write(tmp_path / "m.h5", {"axis": [ANGLE, SPEED], **critical}, values)
-        for name in ("steps", "frequency", *(["critical_eigenvalue"] if critical else [])):
-            with open_result(result) as stored, applied():
-                figure = draw(stored, variable=name)
-            mesh = figure.axes[0 if critical else 1].collections[0]
-            shown = np.ma.filled(mesh.get_array().reshape(7, 8).T.astype(float), np.nan)  # type: ignore[union-attr]
-            np.testing.assert_allclose(shown, values[name])
-            assert name.replace("_", " ") in figure.axes[-1].get_ylabel()
-        with pytest.raises(UsageError, match="give one of amplitude, amplitude_first, amplitude_forced, "):
-            plot_result(result, tmp_path / "r.png", force=False, variable="regime")
-
-
-def test_the_line_of_critical_friction_is_the_closed_form(tmp_path: Path) -> None:
-    """Flutter of the undamped shoe at |cxy|/K + (cxx - cyy - K)²/(4 |cxy| K), at every stiffness of link 2."""
-    case = (Path(__file__).parents[3] / "cases" / "relaxation.toml").read_text()
-    resolved = parse_case(case, "case", ["link1.damping=0", "link2.damping=0"]).resolved
-    friction = {"parameter": "friction.coefficient", "start": 0.0, "stop": 2.0, "num": 5}
-    stiffness = {"parameter": "link2.stiffness", "values": [1.15e7, 1.2e7, 1.25e7]}
-    result = write(tmp_path / "r.h5", {"axis": [friction, stiffness]}, resolved_toml=resolved)
-    k = 2e6
-    c1 = 1e7
-    angle = np.radians(5.0)
-    c2 = np.array(stiffness["values"])
-    cxy = c2 * np.sin(angle) * np.cos(angle)
-    difference = c2 * np.cos(2.0 * angle) - c1 - k
-    expected = cxy / k + difference**2 / (4.0 * cxy * k)
-    (line,) = [each for each in drawn(result).axes[0].collections if isinstance(each, ContourSet)]
-    points = np.concatenate([path.vertices for path in line.get_paths()])
-    for place, phi in zip(c2, expected, strict=True):
-        on_it = points[np.abs(points[:, 1] - place) < 1.0]
-        assert on_it[:, 0] == pytest.approx(phi, rel=1e-6)
-        assert len(on_it)
-    assert "critical friction" in legend(drawn(result))
-    along = drawn(result, ["link2.stiffness=1.2e7"]).axes[0]
-    assert line_at(along, "critical friction") == pytest.approx(expected[1], rel=1e-6)
-
-
 def test_no_friction_is_below_the_critical_one_of_a_shoe_that_is_never_stable(tmp_path: Path) -> None:
     plan = write_sweep(tmp_path, frictions(4), case=resolved_toml(make(SQUEAL, **NEVER_STABLE))).plan
     assert margins(plan) == pytest.approx(-np.linspace(0.1, 1.0, 4))
-
-
-def line_at(axes: Any, label: str) -> float:
-    return float(line(axes, label).get_xdata()[0])
 
 
 def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: Path) -> None:
@@ -302,26 +208,3 @@ def test_other_kinds_of_results_are_refused_and_select_is_for_sweeps(tmp_path: P
         result.commit()
     with pytest.raises(UsageError, match="for runs, sweeps and branches"):
         plot_result(tmp_path / "modes.h5", tmp_path / "r.png", force=False, variable="x")
-
-
-@pytest.mark.parametrize("every", [3, pytest.param(1, marks=campaign)])
-@campaign
-def test_sweeps_of_any_values_are_drawn(tmp_path: Path, every: int) -> None:
-    """All missing, all zero, all the same, of very different size; one axis and two."""
-    values: list[Callable[[int], Any]] = [
-        lambda count: np.full(count, np.nan),
-        np.zeros,
-        lambda count: np.full(count, 7e6),
-        lambda count: np.geomspace(1e-12, 1e3, count),
-    ]
-    for axes, critical, drawn_by in list(product(([ANGLE], [SPEED, ANGLE]), (False, True), values))[::every]:
-        shape = (8,) if len(axes) == 1 else (7, 8)
-        same = drawn_by(math.prod(shape)).reshape(shape)
-        changed = columns(shape, critical=critical) | {"amplitude": same, "frequency": same}
-        if critical:
-            changed |= {"critical": same, "critical_eigenvalue": same, "critical_sustained": same}
-        table = {"axis": axes, **({"critical": CRITICAL} if critical else {})}
-        figure = drawn(write(tmp_path / "r.h5", table, changed))
-        with applied():
-            figure.draw_without_rendering()
-        assert figure.axes[0].get_window_extent().width > 200

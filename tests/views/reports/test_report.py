@@ -32,13 +32,10 @@ from brakecli.studies.scattering.advised import squealing
 from brakecli.studies.sweeps.lock_in import lock_in
 from brakecli.studies.sweeps.lock_in import write as write_lock_in
 from brakecli.studies.sweeps.tables import Axis
-from brakecli.views.motion import reasons_of
 from brakecli.views.plots import style
-from brakecli.views.plots.branch import draw
 from brakecli.views.reports import blocks, of_run, of_several, of_sweep, page, sweep_map
 from brakecli.views.reports.of_several import best_of
 from brakecli.views.reports.page import write_report
-from brakecli.views.view import sentences
 from tests.campaign import campaign
 from tests.commands import ROOT, TINY
 from tests.views.plots.helpers import ANGLE, CRITICAL, SPEED, columns, write
@@ -193,13 +190,6 @@ def test_the_first_page_has_question_answer_one_picture_and_what_to_change(
     assert {each.parameter for each in report.advice} <= {cells[0] for _, cells in rows(appendix)}
 
 
-def test_keys_keep_their_spelling_and_lengths_have_a_prefix() -> None:
-    lines = ["solver.duration: settled after 0.1 s", "the pad opens"]
-    assert sentences(lines) == ["solver.duration: settled after 0.1 s.", "The pad opens."]
-    found = {"reasons": ["it comes to an amplitude of 8.71e-05 m at 0.05 m/s"]}
-    assert reasons_of(found, blocks.PAGE) == ["it comes to an amplitude of 87.1\u00a0µm at 0.05 m/s"]
-
-
 def test_headings_are_in_order_and_each_picture_is_there_once_for_those_who_do_not_see_it(found: Page) -> None:
     levels = [int(tag[1]) for tag, _ in found.found if tag in ("h1", "h2", "h3")]
     assert levels[0] == 1
@@ -232,34 +222,6 @@ def test_advice_that_would_take_long_is_left_to_the_command(
     assert (
         "What to change is left out, as it takes long here: `brakecli advise` asks it" in reported(results[0]).html
     )
-
-
-@campaign
-def test_two_runs_stand_beside_each_other_and_what_differs_is_marked(
-    tmp_path: Path, compiled: None, plain: None
-) -> None:
-    for name, changes in {"a": [], "b": ["friction.coefficient=0.3", "shoe.mass=12.0"]}.items():
-        run(parse_case(TINY, "case", changes), tmp_path / f"{name}.h5", force=False)
-    both = reported(tmp_path / "a.h5", tmp_path / "b.h5")
-    beside = both.html[: both.html.index('<article id="part-1">')]
-    apart = [f"shoe.mass = {one}\u00a0kg, friction.coefficient = {two}" for one, two in ((10, 0.6), (12, 0.3))]
-    assert re.findall(r"<h2>(.: .*)</h2>", beside) == [f"A: a.h5, {apart[0]}", f"B: b.h5, {apart[1]}"]
-    assert re.findall("<h1>(.*)</h1>", both.html)[1:] == [f"A: a.h5, {apart[0]}", f"B: b.h5, {apart[1]}"]
-    assert beside.count("By theory, of small vibration and by eigenvalues: ") == 2
-    assert beside.count("<figure>") == 1
-    found = {cells[0]: (marked, cells[1:]) for marked, cells in rows(beside)}
-    assert found["friction.coefficient"] == (True, ["0.6", "0.3", "−50 %"])  # 0.3 / 0.6 - 1
-    assert found["shoe.mass"] == (True, ["10 kg", "12 kg", "+20 %"])
-    assert found["lost contact"] == (False, ["0 %", "0 %", "same"])
-    for number, name in enumerate("ab"):
-        with open_result(tmp_path / f"{name}.h5") as stored:
-            torque, regime = (stored.attributes[each] for each in ("braking_torque", "regime"))
-        assert found["braking torque"][1][number] == f"{torque:.4g} N m"
-        assert found["regime"][1][number] == regime
-    assert all(marked == (cells[-1] not in ("same", "B against A")) for marked, cells in rows(beside))
-    alone = reported(tmp_path / "a.h5", tmp_path / "a.h5")
-    assert "The cases are the same" in " ".join(alone.texts)
-    assert not any(marked for marked, _ in rows(alone.html))
 
 
 def test_without_more_being_asked_for_a_page_has_the_answer_alone(
@@ -346,17 +308,6 @@ def test_of_two_studies_the_better_one_is_named_where_their_intervals_do_not_mee
     assert of_several.seldom_of({"A": often, "B": near, "C": seldom}).startswith("C is best against squeal: ")
 
 
-def test_keys_of_a_study_are_named_by_the_key_that_scatters() -> None:
-    each = {"parameter[4].key": "link2.angle_deg", "parameter[4].low": 4.0}
-    assert of_several._with_its_key("parameter[4].low", [each, each]) == ("link2.angle_deg, low", "deg")
-    other = {"parameter[4].key": "shoe.mass", "parameter[4].low": 4.0}
-    assert of_several._with_its_key("parameter[4].low", [each, other])[0] == "parameter[4].low"
-    ends = ("link2.angle_deg, low", [4.0, 5.5]), ("link2.angle_deg, high", [6.0, 7.5])
-    rows = [of_several._Row(name, values, "deg") for name, values in ends]
-    assert of_several._changes(rows, 0) == "link2.angle_deg 4 … 6\u00a0deg"
-    assert of_several._changes([], 0) == ""
-
-
 @pytest.mark.parametrize(
     ("before", "after", "unit", "said"),
     [
@@ -373,22 +324,7 @@ def test_a_change_is_a_part_of_what_was_or_a_difference(before: Any, after: Any,
     assert of_several._change(before, after, unit) == said
 
 
-def test_many_changed_keys_are_named_where_a_single_page_has_no_room_for_them(tmp_path: Path, plain: None) -> None:
-    changes = ["shoe.mass=11.0", "friction.coefficient=0.5", "load.force=4e3", "wheel.radius=0.4"]
-    changes += ["link1.stiffness=2e7", "link1.damping=200.0", "link2.damping=200.0"]
-    for name, case in (("a", parse_case(BASE, "case")), ("b", parse_case(BASE, "case", changes))):
-        about: dict[str, Any] = {"title": "T", "resolved_toml": case.resolved, "case_toml": BASE}
-        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": CRITICAL}, **about)
-    pair = [tmp_path / "a.h5", tmp_path / "b.h5"]
-    keys = {change.partition("=")[0] for change in changes}
-    short = reported(*pair, full=False).html
-    shown = {cells[0] for _, cells in rows(short)} & keys
-    (named,) = re.findall(r"<p>Different, too: (.*)\.</p>", short)
-    assert len(shown) == of_several._MOST_KEYS
-    assert shown | {*named.split(", ")} == keys
-    assert {cells[0] for _, cells in rows(reported(*pair).html)} >= keys
-
-
+@campaign
 def test_a_pdf_has_one_page_and_the_same_bytes_again(results: list[Path], tmp_path: Path) -> None:
     pytest.importorskip("weasyprint")
     for name in ("a", "b"):
@@ -440,26 +376,6 @@ def test_without_what_makes_a_pdf_the_remedy_is_said(
     refused(r"finds no library of the system that it needs \(cannot load library 'libpango-1.0-0': no such file\)")
 
 
-@campaign
-def test_two_results_are_compared_by_curves_or_by_a_picture_of_each(
-    results: list[Path], tmp_path: Path, plain: None
-) -> None:
-    def pictures(*names: str) -> int:
-        html = reported(*(tmp_path / f"{name}.h5" for name in names)).html
-        return html[: html.index('<article id="part-1">')].count("<figure>")
-
-    for name in "ab":
-        sought = {**CRITICAL, "lower": 0.1} if name == "b" else CRITICAL
-        write(tmp_path / f"{name}.h5", {"axis": [ANGLE], "critical": sought}, **origin())
-        write(tmp_path / f"{name}{name}.h5", {"axis": [ANGLE, SPEED]}, **origin())
-    assert (pictures("a", "b"), pictures("aa", "bb")) == (1, 2)
-    both = reported(tmp_path / "a.h5", tmp_path / "b.h5").html
-    assert (True, ["critical.lower", "0", "0.1", "differs"]) in rows(both)  # a key of the sweep, not of its case
-    assert (pictures("a", "b", "a"), pictures("aa", "bb", "aa")) == (1, 3)
-    assert pictures("a", "b", "a", "b") == 0  # of more than three each is alone
-    assert "What was changed" not in reported(*results[:2]).html  # nor are results of two kinds compared
-
-
 @pytest.mark.parametrize("given", [False, pytest.param(True, marks=campaign)])
 @campaign
 def test_what_the_program_has_chosen_is_no_change_of_the_user(given: bool, tmp_path: Path, plain: None) -> None:
@@ -478,35 +394,6 @@ def test_what_the_program_has_chosen_is_no_change_of_the_user(given: bool, tmp_p
     assert "different, too" not in close
     heading = "T: output.sample_interval 100\u00a0µs → 200\u00a0µs" if given else "T: a.h5 – b.h5"
     assert f"<h1>{heading}</h1>" in changed
-
-
-def test_branches_have_a_sentence_a_picture_and_their_special_points(
-    tmp_path: Path, compiled: None, plain: None
-) -> None:
-    (tmp_path / "c.toml").write_text(TINY)
-    tree = brakecli.branch(
-        tmp_path / "c.toml", parameter={"friction.coefficient": (0.5, 0.8)}, output=tmp_path / "r.h5"
-    )
-    page = reported(tmp_path / "r.h5")
-    assert f"<p>S{tree.attrs['sentence'][1:]}.</p>" in page.html  # in the answer
-    assert page.html.count("<figure>") == 1
-    assert "of the key" not in page.html
-    critical = stability(system_of(parse_case(TINY, "case").case)).critical
-    assert critical is not None
-    assert "brakecli branch CASE.toml --parameter friction.coefficient=0.5:0.8 -o again.h5" in page.html
-    assert (
-        "<p>CASE.toml stands for the file of the case: a page with --full has the text to copy.</p>" in page.html
-    )
-    assert "<p>CASE.toml stands for the file of the case, which is above as a whole.</p>" in page.html
-    with open_result(tmp_path / "r.h5") as stored, style.applied():
-        lines = draw(stored).axes[0].get_lines()
-    looks = {str(line.get_label()): line.get_linestyle() for line in lines}
-    assert (looks["steady sliding"], looks["limit cycle"], looks["unstable"]) == ("-", "-", "--")
-    flutter = [cells for _, cells in rows(page.html) if cells[:1] == ["flutter"]]
-    assert [float(cells[1]) for cells in flutter] == [pytest.approx(critical.friction, rel=1e-6)] * 2
-    assert flutter[0][3] == "-"  # no motion has an amplitude there
-    text = " ".join(page.texts)
-    assert text.index("Branch 0: steady sliding") < text.index("Branch 1: limit cycle")
 
 
 def test_scatter_has_its_study_and_its_probabilities_as_tables(
