@@ -143,7 +143,7 @@ def test_steady_sliding_changes_where_the_eigenvalues_of_another_formula_do(numb
         assert all(seen.values())
 
 
-@pytest.mark.parametrize("number", counts(0, 15, 200))
+@pytest.mark.parametrize("number", counts(0, 40, 200))
 def test_branches_reach_the_end_of_the_range(number: int) -> None:
     lost = [
         found.branch.ended[1].reason for found in branches(707, number) if found.branch.ended[1].kind != "range"

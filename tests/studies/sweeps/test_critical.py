@@ -240,7 +240,6 @@ def event_driven_growth(friction: float) -> float:
     [
         (15.0, 1.9, True),
         pytest.param(15.0, 0.3, False, marks=campaign),
-        pytest.param(25.0, 0.2, False, marks=campaign),
     ],
 )
 def test_multipliers_of_one_are_no_instability_without_dashpots(
