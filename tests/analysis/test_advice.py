@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from importlib import import_module
 from itertools import islice
 from typing import Any
 
@@ -16,8 +17,10 @@ from brakecli.case.read import LoadedCase
 from brakecli.errors import UsageError
 from brakecli.studies.runs.advise import AdviceReport, advise
 from tests.analysis.shoes import Shoe, random_shoes
-from tests.campaign import counts
+from tests.campaign import campaign, counts
 from tests.examples import MODE_COUPLING, NEVER_STABLE, ROUGH, SQUEAL, make
+
+mpmath = import_module("mpmath")  # imported so because it has no type hints
 
 Tables = dict[str, Any]
 PRESSED = "of the load of 5000 N, 830 N press the shoe on; the links carry the rest"
@@ -43,7 +46,41 @@ def unstable_shoes(seed: int) -> Iterator[tuple[Case, Tables]]:
             yield Case.model_validate(tables), tables
 
 
-@pytest.mark.parametrize("shoes", counts(4, 20))
+def test_sensitivities_of_the_minimal_model_are_those_of_its_closed_form() -> None:
+    """φ of flutter without dashpots, differentiated by mpmath with 30 digits."""
+    case = make(MODE_COUPLING)
+    one = case.link1
+    two = case.link2
+    values = {
+        "mass": 1.0,
+        "c_1": one.stiffness,
+        "c_2": two.stiffness,
+        "beta": one.angle_deg,
+        "alpha": two.angle_deg,
+    }
+    values["k"] = case.contact.stiffness
+
+    def flutter(**v: Any) -> Any:
+        beta = v["beta"] * mpmath.pi / 180
+        alpha = v["alpha"] * mpmath.pi / 180
+        s = (mpmath.sin(beta), mpmath.cos(beta))
+        c = (mpmath.sin(alpha), mpmath.cos(alpha))
+        k = 2 * case.contact.half_length * v["k"]
+        xx = v["c_1"] * s[0] ** 2 + v["c_2"] * c[1] ** 2
+        yy = v["c_1"] * s[1] ** 2 + v["c_2"] * c[0] ** 2
+        xy = -(v["c_1"] * s[0] * s[1] - v["c_2"] * c[0] * c[1])
+        return (xy + (xx - yy - k) ** 2 / (4 * xy)) / k
+
+    with mpmath.workdps(30):
+        assert float(flutter(**values)) == pytest.approx(0.75, abs=1e-12)
+        for name, value in values.items():
+            exact = float(mpmath.diff(lambda x, name=name: flutter(**{**values, name: x}), value))
+            found = sensitivity(case, tuple(ENDS[name].split(".")), 0.75, tell)
+            assert found.derivative == pytest.approx(exact, abs=1e-9 / value), name
+            assert found.elasticity == pytest.approx(exact * value / 0.75, abs=1e-8), name
+
+
+@pytest.mark.parametrize("shoes", counts(4, 40))
 def test_derivatives_are_those_of_perturbation_theory(shoes: int) -> None:
     """Where a pair crosses, Re(uᴴ dA v / uᴴ v) = 0 along the change of a number and of φ together."""
 
@@ -81,6 +118,30 @@ def test_derivatives_are_those_of_perturbation_theory(shoes: int) -> None:
             assert given.derivative == pytest.approx(expected, abs=bound), path
             compared += 1
     assert compared > 3 * shoes
+
+
+@pytest.mark.parametrize("shoes", counts(2, 50))
+def test_an_advised_value_is_stable_up_to_the_margin_and_unstable_just_beyond(shoes: int) -> None:
+    """By growth rates of matrices that are built here, up to 1.2 times the friction, and 10⁻⁶ before the value."""
+    helped = 0
+    for case, tables in islice(unstable_shoes(4), shoes):
+        target = 1.2 * tables["friction"]["coefficient"]
+        for path in advised_keys(case, ("link2.angle_deg", "link*.stiffness")):
+            found = advised(case, path, 0.2, tell)
+            if found.to is None:
+                continue
+
+            def rate(value: float, phi: float, path: Any = path, tables: Tables = tables) -> float:
+                there = {**tables, path[0]: {**tables[path[0]], path[1]: value}}
+                return replace(Shoe.of(there), phi=phi).rate
+
+            rounding = 1e-9 * 2.0 * math.pi * Shoe.of(tables).fast
+            assert max(rate(found.to, phi) for phi in np.linspace(0.0, target, 50)) <= rounding, found
+            back = found.to + 1e-6 * (found.start - found.to)
+            assert rate(back, target * (1.0 + 1e-12)) > -rounding, found
+            assert found.lowest <= found.to <= found.highest
+            helped += 1
+    assert helped > shoes
 
 
 def test_a_damping_of_zero_has_a_derivative_where_the_other_link_is_damped_and_none_where_it_jumps() -> None:
@@ -271,6 +332,37 @@ def test_a_load_that_the_links_carry_is_told_where_they_carry_more_of_it_than_th
     assert (told in report.notes()) is (force < 2500.0)
 
 
+@campaign
+def test_open_pads_rest_on_the_mean_stiffness_and_lists_are_scaled_as_a_whole() -> None:
+    waves = {"amplitudes": [30e-6, 20e-6], "wavelengths": [0.02, 0.013]}
+    case = make(
+        SQUEAL, load__force=200.0, friction__coefficient=1.5, roughness__wheel=waves, solver__duration=0.02
+    )
+    report = advice_on(case)
+    assert any("mean stiffness" in note for note in report.notes())
+    by_key = {each.parameter: each for each in report.sensitivities}
+    given = by_key["roughness.wheel.amplitudes"]
+    assert given.value == (30e-6, 20e-6)
+    assert given.elasticity is not None
+    more = changed(case, ("roughness", "wheel", "amplitudes"), (33e-6, 22e-6))
+    assert more is not None
+    moved = answer(more)
+    assert moved is not None
+    assert moved.critical is not None
+    assert report.critical_friction is not None
+    part = math.log(moved.critical / report.critical_friction) / math.log(1.1)
+    assert given.error is not None
+    bend = 0.1 * part  # of the curve, over a tenth of the amplitudes
+    assert abs(given.elasticity - part) <= given.error + bend
+    best = report.advice[0]
+    assert best.to is not None
+    there = changed(case, tuple(best.parameter.split(".")), best.to)
+    assert there is not None
+    reached = answer(there)
+    assert reached is not None
+    assert reached.critical == pytest.approx(1.8, rel=1e-3)
+
+
 def test_keys_are_chosen_by_patterns() -> None:
     case = make(ROUGH)
     assert ("load", "force") in advised_keys(case, KEYS)
@@ -290,7 +382,7 @@ def test_an_angle_that_helps_at_0_alone_is_advised_so_exactly() -> None:
     assert (found.to, found.rounded, found.critical_friction) == (0.0, "0", None)
 
 
-@pytest.mark.parametrize("shoes", counts(0, 8))
+@pytest.mark.parametrize("shoes", counts(0, 20))
 def test_no_safe_value_lies_nearer_than_the_advised_one(shoes: int) -> None:
     """400 values of each key, by growth rates at φ = 0 and at the margin of matrices that are built here."""
     helped = 0
@@ -362,3 +454,33 @@ def test_a_safe_decade_of_a_damping_that_is_zero_is_found_between_its_roots() ->
             reached = answer(there)
             assert reached is not None
             assert reached.safe(least) is safe
+
+
+def test_an_interval_ends_where_the_shoe_locks_though_rounding_leaves_a_power_too_much() -> None:
+    """det(S) is linear in the stiffness of a link, but computed as a difference of squares."""
+    case = make(
+        SQUEAL,
+        shoe__mass=12.098,
+        wheel__angular_speed=-0.94722,
+        link1__stiffness=6973400.0,
+        link1__damping=1.5145,
+        link1__angle_deg=-24.495,
+        link2__stiffness=8633700.0,
+        link2__damping=9.8552,
+        link2__angle_deg=-44.531,
+        friction__coefficient=1.4944,
+        contact__half_length=0.011912,
+        contact__stiffness=424610000.0,
+    )
+    found = advised(case, ("link2", "stiffness"), 0.2, tell)
+    beta = math.radians(-24.495)
+    alpha = math.radians(-44.531)
+    k = 2.0 * 0.011912 * 424610000.0
+    grip = -1.2 * 1.4944
+    c_1 = 6973400.0
+    # det(S) = c1 c2 cos²(α - β) + K (cxx - grip cxy)
+    slope = c_1 * math.cos(alpha - beta) ** 2 + k * math.cos(alpha) * (math.cos(alpha) + grip * math.sin(alpha))
+    root = -k * c_1 * math.sin(beta) * (math.sin(beta) - grip * math.cos(beta)) / slope
+    assert found.to is not None
+    assert root < found.to < found.start
+    assert found.until == pytest.approx(root, rel=1e-9)

@@ -19,6 +19,7 @@ from brakecli.solver.roughness import Surface
 from brakecli.studies.runs.limits import adjustments
 from brakecli.studies.sweeps.journal import identity
 from brakecli.studies.sweeps.plan import parse_sweep
+from brakecli.studies.sweeps.point import compute
 from tests.case.examples import ORDERS, SMALL, SPECTRA, messages
 
 RADIUS = 0.5  # m, of the wheel of SMALL
@@ -172,6 +173,23 @@ def test_turns_are_averaged_and_what_is_left_of_one_is_not_used(tmp_path: Path) 
     assert "mean of 3 turns, which differ from it by 2.12e-06 m (RMS)" in (found.note or "")  # 3 / sqrt(2) um
 
 
+def test_a_profile_of_the_shoe_loses_its_line_and_repeats_beyond_its_length(tmp_path: Path) -> None:
+    x = (np.arange(200) - 99.5) * 1e-3  # m; cosines about the middle have no part of a line in them
+    heights = 5e-6 * np.cos(2.0 * math.pi * 6.0 * x / 0.2) + 1e-3 * x + 4e-4
+    path = tmp_path / "shoe.csv"
+    saved(path, "x_m,z_m", x, heights)
+    case = loaded(f'roughness.shoe.profile="{path}"').case
+    assert case.roughness.shoe is not None
+    assert case.roughness.shoe.wavelengths == pytest.approx([0.2 / 6.0])
+    surface = system_of(case).shoe
+    np.testing.assert_allclose(height(surface, x), 5e-6 * np.cos(2.0 * math.pi * 6.0 * x / 0.2), atol=1e-15)
+    assert "reaches beyond" not in (case.roughness.shoe.note or "")
+    saved(path, "x_m,z_m", x - x[0], heights)
+    assert "the pad from -0.05 to 0.05 m reaches beyond 0 to 0.199 m" in str(
+        adjustments(system_of(loaded(f'roughness.shoe.profile="{path}"').case))
+    )
+
+
 def test_a_gap_in_a_profile_is_told(tmp_path: Path) -> None:
     places = np.arange(0.0, TURN, TURN / 360)
     places = places[(places < 0.5) | (places > 0.7)]
@@ -179,7 +197,8 @@ def test_a_gap_in_a_profile_is_told(tmp_path: Path) -> None:
     assert "a straight line bridges a gap of 0.20" in case.resolved
 
 
-@pytest.mark.parametrize(("turns", "missed"), [(1, 0.0), (2, 0.001), (1, -0.001)])
+@pytest.mark.parametrize("turns", [1, 2])
+@pytest.mark.parametrize("missed", [0.0, 0.001, -0.001])
 def test_a_record_that_misses_a_turn_by_a_little_tells_that_it_was_stretched(
     tmp_path: Path, turns: int, missed: float
 ) -> None:
@@ -189,6 +208,18 @@ def test_a_record_that_misses_a_turn_by_a_little_tells_that_it_was_stretched(
     note = loaded(saved(tmp_path / "p.csv", "angle_deg,um", angles, np.cos(np.radians(angles)))).resolved
     assert (f"the record was stretched by {'-' * (missed < 0)}" in note) == (missed != 0.0)
     assert f"{100.0 * abs(missed) / turns:.1g} % to whole turns" in note or not missed
+
+
+@pytest.mark.parametrize("error", [0.5, 0.1, 0.01])
+def test_no_fewer_sines_leave_out_so_little_of_a_profile(tmp_path: Path, error: float) -> None:
+    heights = np.random.default_rng(3).normal(size=400)
+    override = saved(tmp_path / "noise.csv", "angle_deg,height_um", np.arange(400) * 0.9, heights)
+    surface = system_of(loaded(override, f"roughness.wheel.profile_error={error}").case).wheel
+    heights = 1e-6 * (heights - heights.mean())
+    left = heights - height(surface, np.arange(400) * (TURN / 400))
+    total = np.mean(heights**2)
+    assert math.sqrt(np.mean(left**2) / total) <= error
+    assert math.sqrt((np.mean(left**2) + 0.5 * np.min(surface.g) ** 2) / total) > error
 
 
 def test_a_result_repeats_without_the_profile_and_tells_what_was_lost(tmp_path: Path) -> None:
@@ -371,18 +402,12 @@ def test_a_result_says_why_it_does_not_take_what_its_surface_was_made_of(tmp_pat
     assert smooth.case.wheel.radius == 0.6
 
 
-def test_a_profile_of_the_shoe_loses_its_line_and_repeats_beyond_its_length(tmp_path: Path) -> None:
-    x = (np.arange(200) - 99.5) * 1e-3  # m; cosines about the middle have no part of a line in them
-    heights = 5e-6 * np.cos(2.0 * math.pi * 6.0 * x / 0.2) + 1e-3 * x + 4e-4
-    path = tmp_path / "shoe.csv"
-    saved(path, "x_m,z_m", x, heights)
-    case = loaded(f'roughness.shoe.profile="{path}"').case
-    assert case.roughness.shoe is not None
-    assert case.roughness.shoe.wavelengths == pytest.approx([0.2 / 6.0])
-    surface = system_of(case).shoe
-    np.testing.assert_allclose(height(surface, x), 5e-6 * np.cos(2.0 * math.pi * 6.0 * x / 0.2), atol=1e-15)
-    assert "reaches beyond" not in (case.roughness.shoe.note or "")
-    saved(path, "x_m,z_m", x - x[0], heights)
-    assert "the pad from -0.05 to 0.05 m reaches beyond 0 to 0.199 m" in str(
-        adjustments(system_of(loaded(f'roughness.shoe.profile="{path}"').case))
-    )
+def test_a_wheel_with_a_profile_goes_on_turning_along_a_line(tmp_path: Path) -> None:
+    profiled(tmp_path)
+    axes = [
+        {"parameter": "roughness.wheel.profile_error", "values": [0.5, 0.05]},
+        {"parameter": "friction.coefficient", "values": [0.1, 0.2], "direction": "up"},
+    ]
+    plan = parse_sweep(tomli_w.dumps({"case": "case.toml", "axis": axes}), "sweep.toml", tmp_path).plan
+    records = compute(plan, 0, plan.units)
+    assert {*records["status"].tolist()} == {b"done"}

@@ -1,5 +1,6 @@
 """What a result holds, how two of them differ, and numbers for other programs."""
 
+import csv
 import math
 import re
 import wave
@@ -12,9 +13,11 @@ import numpy as np
 import pytest
 
 from brakecli.about import __version__
+from brakecli.case.read import parse_case
 from brakecli.results import fields
-from brakecli.results.contents import INFO, difference
+from brakecli.results.contents import INFO, Difference, difference
 from brakecli.results.read import open_result
+from brakecli.studies.runs.run import run
 from brakecli.views.plots import over_each_other
 from brakecli.views.view import sentence
 from tests.campaign import campaign
@@ -119,6 +122,50 @@ def test_what_is_exported_can_be_classified_by_its_names_and_units(folder: Path,
     assert verdict.json["frequency"] == pytest.approx(attributes(folder / "b.h5")["frequency"], rel=1e-3)
 
 
+@campaign
+def test_as_many_values_as_directions_are_exported(tmp_path: Path) -> None:
+    """`hysteresis` has one number for each value, alike in both directions."""
+    (tmp_path / "tiny.toml").write_text(TINY)
+    axis = 'parameter = "friction.coefficient"\nvalues = [0.5, 0.6]\ndirection = "both"\n'
+    (tmp_path / "s.toml").write_text(f'case = "tiny.toml"\n[[axis]]\n{axis}')
+    brakecli("sweep", "s.toml", "-q", cwd=tmp_path).told(0)
+    brakecli("export", "s.h5", cwd=tmp_path).told(0)
+    head, *rows = csv.DictReader((tmp_path / "s.csv").read_text().splitlines())
+    rows = [head, *rows]
+    assert len(rows) == 4
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert [float(row["hysteresis"]) for row in rows] == [*file["hysteresis"]] * 2
+
+
+def test_spectra_and_chosen_variables_are_exported(folder: Path, tmp_path: Path) -> None:
+    chosen = ["--group", "spectrum", "--variable", "y", "--variable", "vx"]
+    brakecli("export", folder / "a.h5", *chosen, "-o", "s.csv", cwd=tmp_path).told(0)
+    table = pandas.read_csv(tmp_path / "s.csv")
+    assert [*table.columns] == ["frequency (Hz)", "y (m^2/Hz)", "vx ((m/s)^2/Hz)"]
+    np.testing.assert_array_equal(table["vx ((m/s)^2/Hz)"], history(folder / "a.h5", "vx", "spectrum"))
+
+
+def test_the_windows_of_a_stop_are_exported(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(SQUEAL)
+    stop = "wheel={radius=0.5, times=[0.0, 0.5], angular_speeds=[0.4, 0.1]}"
+    groups = {"over_time": 1, "spectrogram": 2, "vibrations": 1}
+    exports = [["export", "r.h5", "-q", "--group", group, "-o", f"{group}.csv"] for group in groups]
+    for done in each(tmp_path, [["run", "tiny.toml", "-q", "-o", "r.h5", "--set", stop], *exports]):
+        done.told(0)
+    for group, axes in groups.items():
+        table = pandas.read_csv(tmp_path / f"{group}.csv")
+        with h5py.File(tmp_path / "r.h5") as file:
+            assert {head.partition(" ")[0] for head in table.columns} == {*file[group]}
+            assert [*table.columns[:axes].str.partition(" ").get_level_values(0)] == {
+                "over_time": ["time"],
+                "spectrogram": ["time", "frequency"],
+                "vibrations": ["interval"],
+            }[group]
+            for head in table.columns[axes:]:
+                held = file[group][head.partition(" ")[0]][:].ravel()
+                np.testing.assert_array_equal(table[head].fillna(held.max()), held)
+
+
 def test_a_sweep_and_modes_are_a_row_for_each_point(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(TINY)
     (tmp_path / "grid.toml").write_text(GRID)
@@ -175,6 +222,24 @@ def test_a_sound_tells_what_cannot_be_heard(tmp_path: Path) -> None:
     assert "of the power of vx is above 22050 Hz and not in the sound" in done.told(0)
 
 
+@pytest.mark.parametrize("mass", [1e3, 1e7])
+def test_a_tone_below_hearing_is_told_whether_it_is_sustained_or_not(tmp_path: Path, mass: float) -> None:
+    (tmp_path / "tiny.toml").write_text(TINY.replace("{ step = 1e-5, duration = 0.02 }", "{ duration = 3.0 }"))
+    lowest = math.sqrt(1e7 / mass) / (2.0 * math.pi)  # Hz; the stiffer spring is 1.2e7 N/m and the contact 2e6 N/m
+    change = [
+        "--set",
+        f"shoe.mass={mass}",
+        "--set",
+        "output.sample_interval=1e-3",
+        "--set",
+        "wheel.angular_speed=1",
+    ]
+    done = each(tmp_path, [["run", "tiny.toml", "-q", "-o", "r.h5", *change], ["export", "r.h5", "-o", "r.wav"]])
+    found = re.search(r"the vibration at (\S+) Hz cannot be heard", done[1].told(0))
+    assert found
+    assert 0.5 * lowest < float(found[1]) < 2.0 * lowest + 1.0 / 3.0  # Hz, the distance of lines of 3 s
+
+
 @pytest.mark.parametrize("start", [0.0, 0.4])
 def test_the_sound_of_what_dies_out_tells_when_it_is_heard(start: float, tmp_path: Path) -> None:
     """Of a decay by a rate a hundredth is left after log(100) over it; the part that is cut out begins anew."""
@@ -193,6 +258,15 @@ def test_the_sound_of_what_dies_out_tells_when_it_is_heard(start: float, tmp_pat
     assert end == pytest.approx(
         min(math.log(100.0) / -run.json["growth_rate"], whole), rel=0.2
     )  # beside a second mode
+
+
+def test_samples_that_are_not_equally_spaced_make_no_sound(folder: Path, tmp_path: Path) -> None:
+    (tmp_path / "r.h5").write_bytes((folder / "a.h5").read_bytes())
+    with edited(tmp_path / "r.h5") as file:
+        time = file["history/time"]
+        time[:] = time[-1] * (time[:] / time[-1]) ** 1.1
+    brakecli("export", "r.h5", "-o", "r.wav", cwd=tmp_path).told(2, "its samples are not equally spaced")
+    brakecli("export", "r.h5", cwd=tmp_path).told(0)
 
 
 ERRORS = [
@@ -299,6 +373,30 @@ def test_a_sentence_says_what_differs_in_lines_of_eighty_columns(folder: Path) -
     assert f"{most[0]:.3g} times its largest value" in head
 
 
+@pytest.mark.parametrize(
+    ("count", "words"),
+    [
+        (1, "in k0"),
+        (3, "in k0, k1, k2"),
+        (4, "in k0, k1, k2 and 1 more key"),
+        (5, "in k0, k1, k2 and 2 more keys"),
+    ],
+)
+def test_a_sentence_names_three_keys_and_counts_the_others(count: int, words: str) -> None:
+    case = [{"name": f"k{number}", "a": 1, "b": 2} for number in range(count)]
+    assert Difference(case, [], [], [], judged=False).sentence == f"the case differs {words}"
+
+
+def test_states_are_counted_and_have_no_size(tmp_path: Path) -> None:
+    """A shoe that sticks and one that slides: their codes have no size."""
+    for name, friction in (("a.h5", 0.9), ("b.h5", 0.1)):
+        run(parse_case(TINY, "tiny", [f"friction.coefficient={friction}"]), tmp_path / name, force=False)
+    with open_result(tmp_path / "a.h5") as a, open_result(tmp_path / "b.h5") as b:
+        found = {each["name"]: each for each in difference(a, b).variables}
+    assert found["state"]["different"] > 0
+    assert found["state"]["largest"] is found["state"]["relative"] is None
+
+
 def test_a_sentence_counts_the_points_of_sweeps_with_another_verdict(tmp_path: Path) -> None:
     reports = []
     for name, made in (("a", [CYCLE, DAMPED, CYCLE]), ("b", [DAMPED, DAMPED, CYCLE])):
@@ -379,6 +477,14 @@ def test_results_of_two_kinds_are_not_compared(folder: Path) -> None:
     brakecli("diff", "a.h5", "modes.h5", cwd=folder).told(2, "a.h5 is a run, and modes.h5 a stability")
 
 
+@pytest.mark.parametrize("names", [("modes.h5", "other.h5"), ("b.h5", "short.h5")])
+@campaign
+def test_two_results_are_drawn_over_each_other(folder: Path, tmp_path: Path, names: tuple[str, str]) -> None:
+    done = brakecli("diff", *(folder / name for name in names), "-o", "d.png", "--json", cwd=tmp_path)
+    assert done.json["output"] == "d.png"
+    assert (tmp_path / "d.png").read_bytes().startswith(b"\x89PNG")
+
+
 def test_the_spectra_of_two_runs_have_the_unit_of_their_motion_and_envelopes_reach_its_end(folder: Path) -> None:
     with open_result(folder / "a.h5") as a, open_result(folder / "b.h5") as b:
         motion, whole, spectra = over_each_other.draw((a, b), "vx").axes
@@ -393,15 +499,6 @@ def test_the_spectra_of_two_runs_have_the_unit_of_their_motion_and_envelopes_rea
     assert {np.asarray(line.get_xdata())[-1] for line in whole.lines} == {history(folder / "a.h5", "time")[-1]}
 
 
-def test_samples_that_are_not_equally_spaced_make_no_sound(folder: Path, tmp_path: Path) -> None:
-    (tmp_path / "r.h5").write_bytes((folder / "a.h5").read_bytes())
-    with edited(tmp_path / "r.h5") as file:
-        time = file["history/time"]
-        time[:] = time[-1] * (time[:] / time[-1]) ** 1.1
-    brakecli("export", "r.h5", "-o", "r.wav", cwd=tmp_path).told(2, "its samples are not equally spaced")
-    brakecli("export", "r.h5", cwd=tmp_path).told(0)
-
-
 def test_what_has_no_curves_is_refused_and_leaves_no_picture(folder: Path, tmp_path: Path) -> None:
     names = [folder / "modes.h5", folder / "other.h5"]
     for words, what in (
@@ -410,21 +507,3 @@ def test_what_has_no_curves_is_refused_and_leaves_no_picture(folder: Path, tmp_p
     ):
         brakecli("diff", *names, *words, cwd=tmp_path).told(2, what)
     assert left_in(tmp_path) == set()
-
-
-@pytest.mark.parametrize("mass", [1e7])
-def test_a_tone_below_hearing_is_told_whether_it_is_sustained_or_not(tmp_path: Path, mass: float) -> None:
-    (tmp_path / "tiny.toml").write_text(TINY.replace("{ step = 1e-5, duration = 0.02 }", "{ duration = 3.0 }"))
-    lowest = math.sqrt(1e7 / mass) / (2.0 * math.pi)  # Hz; the stiffer spring is 1.2e7 N/m and the contact 2e6 N/m
-    change = [
-        "--set",
-        f"shoe.mass={mass}",
-        "--set",
-        "output.sample_interval=1e-3",
-        "--set",
-        "wheel.angular_speed=1",
-    ]
-    done = each(tmp_path, [["run", "tiny.toml", "-q", "-o", "r.h5", *change], ["export", "r.h5", "-o", "r.wav"]])
-    found = re.search(r"the vibration at (\S+) Hz cannot be heard", done[1].told(0))
-    assert found
-    assert 0.5 * lowest < float(found[1]) < 2.0 * lowest + 1.0 / 3.0  # Hz, the distance of lines of 3 s

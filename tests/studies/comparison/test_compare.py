@@ -144,6 +144,13 @@ def test_every_method_of_a_case_is_told_apart_by_its_label() -> None:
     } <= labels
 
 
+def test_a_start_that_moves_leaves_out_the_papers_start_which_is_one_from_rest() -> None:
+    moving = kinds(system_of(make(SQUEAL, initial__vx=0.01)))
+    resting = kinds(system_of(make(SQUEAL)))
+    assert {method.start for method in resting} == {"consistent", "paper"}
+    assert moving == [method for method in resting if method.start == "consistent"]
+
+
 def test_the_ladder_halves_from_a_step_that_resolves_the_fastest_motion() -> None:
     slow = make(SQUEAL)
     steps = ladder(system_of(slow))
@@ -215,6 +222,23 @@ def test_observed_orders_are_those_that_the_schemes_declare() -> None:
     assert checked == 2 * STEPPING
 
 
+def test_observed_order_is_that_of_the_errors_of_neighbours() -> None:
+    coarse, fine = entries_of(smooth_comparison(), "three-layer", NUMEROV)[1:3]
+    assert coarse.errors is not None
+    assert fine.errors is not None
+    assert fine.order == pytest.approx(math.log2(coarse.errors.error / fine.errors.error), rel=1e-9)
+
+
+def test_the_event_driven_scheme_keeps_near_its_tolerance_and_reaches_the_reference() -> None:
+    found = entries_of(smooth_comparison(), "event-driven", ())
+    assert [entry.tolerance for entry in found] == list(TOLERANCES)
+    sizes = [entry.errors.error for entry in found if entry.errors is not None]
+    assert len(sizes) == len(TOLERANCES)
+    assert sizes == sorted(sizes, reverse=True)
+    assert sizes[-1] < 1e-7
+    assert smooth_comparison().reference_error < 1e-8
+
+
 def test_step_limits_and_biases_are_those_of_stability() -> None:
     checked = 0
     for theta in ((0.5, 0.5), (1.0, 1.0), (1.0, 0.5), QUARTERS, NUMEROV):
@@ -228,6 +252,42 @@ def test_step_limits_and_biases_are_those_of_stability() -> None:
             assert entry.step_limit == (math.inf if known.step_limit is None else known.step_limit)
             checked += 1
     assert checked >= 25
+
+
+def test_the_bias_of_weights_of_one_is_as_published() -> None:
+    at = next(e for e in entries_of(smooth_comparison(), "two-layer", (1.0, 1.0)) if e.method.step == 0.1)
+    assert at.critical_bias == pytest.approx(0.0615433, abs=5e-8)
+    half = next(e for e in entries_of(smooth_comparison(), "two-layer", (0.5, 0.5)) if e.method.step == 0.1)
+    assert half.critical_bias == pytest.approx(0.0, abs=1e-6)
+
+
+def test_on_rough_surfaces_the_bias_is_that_of_stability_too() -> None:
+    path = str(ROOT / "cases" / "accuracy" / "C.toml")
+    solver = ["solver.theta=[1.0, 1.0]", "solver.duration=1e-3"]
+    case = parse_case(*read_text(path), [*solver, "solver.step=2e-5", "output.sample_interval=2e-5"]).case
+    found = compare(system_of(case), schemes=["two-layer"], steps=[2e-5], budget=1.0)
+    (entry,) = entries_of(found, "two-layer", (1.0, 1.0))
+    known = stability(system_of(case)).discrete
+    assert known is not None
+    assert known.bias is not None
+    assert abs(known.bias) > 1e-3
+    assert entry.critical_bias == pytest.approx(known.bias, abs=1e-10)
+
+
+def test_a_step_above_the_limit_of_numerovs_weights_has_no_result() -> None:
+    limit = math.sqrt(6.0 / 3.0)  # ωh < √6, and ω² = 3
+    found = compare(system_of(smooth()), schemes=["three-layer"], steps=[1.5, 0.5], budget=30.0)
+    above, below = entries_of(found, "three-layer", NUMEROV)
+    for entry in (above, below):
+        assert entry.step_limit == pytest.approx(limit, rel=1e-5)
+    assert above.errors is None
+    assert "unstable" in above.failure
+    assert below.errors is not None
+    assert below.order is None  # there is nothing to compare it with
+    assert not above.on_front
+    unlimited = entries_of(found, "three-layer", QUARTERS)
+    assert [entry.step_limit for entry in unlimited] == [math.inf, math.inf]
+    assert all(entry.errors is not None for entry in unlimited)
 
 
 def test_no_entry_beats_one_of_the_front_and_each_other_is_beaten() -> None:
@@ -290,6 +350,12 @@ def test_the_keys_of_a_method_make_a_case_that_is_solved_by_it(base: dict[str, A
             asked = "auto" if method.evaluator == "closed-form" else method.evaluator
             nodes = method.nodes or made.nodes  # those of the case where the method needs none
             assert replace(made, tolerance=0.0) == replace(method, evaluator=asked, nodes=nodes)
+
+
+def test_nothing_is_recommended_where_nothing_meets_the_target() -> None:
+    numbers = ComparisonReport(Path("x.h5"), smooth(), smooth_comparison(), 1e-15).numbers()
+    assert numbers["recommended"] is None
+    assert numbers["margin"] is None
 
 
 def test_every_evaluator_appears_on_rough_surfaces_and_nodes_lower_the_error() -> None:

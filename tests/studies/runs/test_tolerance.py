@@ -12,6 +12,7 @@ import pytest
 from brakecli.case.case import Case, changed
 from brakecli.case.system import system_of
 from brakecli.errors import CaseError
+from brakecli.solver.integrate import solve
 from brakecli.solver.steady_sliding import steady_sliding
 from brakecli.studies.comparison.compare import errors
 from brakecli.studies.runs import against
@@ -20,7 +21,7 @@ from brakecli.studies.runs.modelled import modelled
 from brakecli.studies.runs.tolerance import certify
 from tests.campaign import campaign, counts
 from tests.commands import TINY, attributes, brakecli
-from tests.examples import ROUGH, SQUEAL, make, simulate
+from tests.examples import COULOMB, ROUGH, SQUEAL, make, simulate
 from tests.solver.test_event_driven import flat_case
 
 promises: Any = import_module("benchmarks.promises")  # benchmarks are not type-checked
@@ -46,7 +47,8 @@ def kept(found: Certified, case: Case, tolerance: float = 1e-12) -> float:
     return error
 
 
-@pytest.mark.parametrize(("tolerance", "friction"), [(1e-2, 0.7), (1e-6, 0.3), (1e-10, 0.7)])
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4, 1e-6, 1e-9, 1e-10])
+@pytest.mark.parametrize("friction", [0.3, 0.7])
 def test_smooth_surfaces_keep_any_tolerance(tolerance: float, friction: float) -> None:
     case = promised(SQUEAL, tolerance, friction__coefficient=friction, solver__duration=0.3)
     found = certify(system_of(case))
@@ -56,7 +58,16 @@ def test_smooth_surfaces_keep_any_tolerance(tolerance: float, friction: float) -
     assert found.motion.system.method.scheme == "piecewise-exact"
 
 
-@pytest.mark.parametrize("many", counts(6, 40))
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-9])
+def test_the_event_driven_scheme_keeps_them_too(tolerance: float) -> None:
+    case = promised(SQUEAL, tolerance, solver__scheme="event-driven", solver__duration=0.3)
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert kept(found, case) <= tolerance
+    assert found.motion.system.method.scheme == "event-driven"
+
+
+@pytest.mark.parametrize("many", counts(6, 100))
 def test_exact_steps_know_what_motions_make_of_their_rounding(many: int) -> None:
     rng = np.random.default_rng(6)
     loose = 0
@@ -70,6 +81,25 @@ def test_exact_steps_know_what_motions_make_of_their_rounding(many: int) -> None
         error = errors(found.motion.rows, truth(Case.model_validate(case), 1e-13)).error
         assert error <= 10.0 * estimate + 1e-11  # both err by chance; and what the truth itself may be off
     assert many < 10 or 0 < loose < many
+
+
+@pytest.mark.parametrize("many", counts(30, 500))
+def test_rounding_that_exact_runs_carry_along_is_more_than_what_other_steps_show(many: int) -> None:
+    """Runs with other steps have other matrices, and other places of their parts beside events."""
+    rng = np.random.default_rng(8)
+    seen = 0
+    for _ in range(many):
+        case, omega = flat_case(rng, 1e-12)
+        case["solver"] = {"duration": 10 ** rng.uniform(2.0, 3.3) / omega, "tolerance": 1e-2}
+        system = system_of(Case.model_validate(case))
+        estimate = certify(system).certificate.estimated_error
+        runs = [solve(replace(system, method=replace(system.method, share=share))) for share in (1.0, 0.37)]
+        if any(run.work.failed for run in runs):  # it grows beyond all bounds
+            continue
+        apart = errors(runs[0].rows, runs[1].rows).error
+        assert apart <= estimate
+        seen += apart > 1e-14
+    assert seen > 0.1 * many
 
 
 @pytest.mark.parametrize("interval", [1e-5, 1e-1])
@@ -126,7 +156,51 @@ def test_nodes_that_agree_by_luck_are_doubled_again() -> None:
     assert kept(found, case, 1e-9) <= 1e-3
 
 
-@pytest.mark.parametrize("many", counts(2, 20))
+@campaign
+def test_the_edges_of_patches_that_hardly_move_do_not_break_a_certificate() -> None:
+    """The wheel moves by 1 µm: the error of a sum over nodes is that of one position, and falls unevenly."""
+    tables: dict[str, Any] = {
+        "shoe": {"mass": 1.1978941200947848},
+        "wheel": {"radius": 0.5, "angular_speed": 0.03193301760732767},
+        "link1": {"stiffness": 2641839.32, "damping": 21.0936550667, "angle_deg": -29.814053851926097},
+        "link2": {"stiffness": 24450950.73530499, "damping": 64.17213895310152, "angle_deg": 29.943775676434917},
+        "load": {"force": 93.76457491802371},
+        "friction": {"coefficient": 0.035261604124427096},
+        "contact": {"half_length": 0.02035804419970634, "stiffness": 325929872.2019398},
+        "roughness": {
+            "wheel": {
+                "amplitudes": [9.297627543302589e-05, 0.0001884838880977388],
+                "wavelengths": [0.029303649610016646, 0.0038416921496541314],
+            },
+            "shoe": {
+                "amplitudes": [0.0001311884681448567, 1.930668322626516e-05, 0.00011197640595953078],
+                "wavelengths": [0.0006792367667911807, 0.0011174514466332748, 0.00029933846887440893],
+                "phases_deg": [163.0371512821398, 129.48719375127544, 201.69367887292043],
+            },
+        },
+        "initial": {"at": "equilibrium"},
+        "solver": {"duration": 6.98418448236102e-05},
+        "output": {"sample_interval": 6.349258620328199e-07},
+    }
+    exact = make(tables, solver__scheme="event-driven", solver__tolerance=1e-10)
+    truth = certify(system_of(exact)).motion.rows[:, :4]
+    for tolerance in (4.6e-3, 3.9e-3, 5.833e-4):
+        found = certify(system_of(make(tables, solver__tolerance=tolerance)))
+        assert found.certificate.certified
+        off = np.abs(found.motion.rows[:, :4] - truth).max(axis=0) / np.abs(truth).max(axis=0)
+        assert off.max() <= tolerance
+
+
+@pytest.mark.parametrize("interval", [2e-6, 1e-4 / 3.0, 4e-4])
+def test_samples_of_any_interval_keep_their_tolerance(interval: float) -> None:
+    case = promised(OPEN, 1e-2, solver__duration=0.004, output__sample_interval=interval)
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert len(found.motion.rows) == system_of(case).samples + 1
+    assert kept(found, case, 1e-6) <= 1e-2
+
+
+@pytest.mark.parametrize("many", counts(2, 60))
 def test_no_certificate_of_random_shoes_is_broken(many: int) -> None:
     rng = np.random.default_rng(3)
     ways = set[str]()
@@ -196,6 +270,14 @@ def test_what_no_step_can_follow_is_not_certified(monkeypatch: pytest.MonkeyPatc
     assert kept(found, case) <= found.certificate.estimated_error
 
 
+def test_what_lasts_for_some_steps_is_certified() -> None:
+    longer = {"times": [0.0170123, 0.0175, 0.018], "forces": [1e3, 3e3, 1e3]}
+    case = promised({**WAVE, "load": longer}, 1e-2, solver__scheme="two-layer")
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-2
+
+
 @pytest.mark.parametrize("promise", [1e-3, 1e-9])
 def test_a_shoe_that_nothing_moves_keeps_any_promise_in_a_few_steps(promise: float) -> None:
     """A wave that divides the length of the pad presses alike wherever it is; what moves is rounding."""
@@ -207,6 +289,15 @@ def test_a_shoe_that_nothing_moves_keeps_any_promise_in_a_few_steps(promise: flo
     assert np.abs(found.motion.rows[:, 2:4]).max() < 1e-15
 
 
+@pytest.mark.parametrize("scheme", ["two-layer", "three-layer"])
+def test_a_scheme_that_is_named_is_kept(scheme: str) -> None:
+    case = promised(SQUEAL, 1e-3, solver__scheme=scheme, solver__duration=0.05)
+    found = certify(system_of(case))
+    assert found.motion.system.method.scheme == scheme
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-3
+
+
 @pytest.mark.parametrize("given", [{}, {"solver__scheme": "event-driven"}], ids=["auto", "named"])
 def test_an_evaluator_that_is_named_is_kept(given: dict[str, Any]) -> None:
     found = {}
@@ -216,6 +307,24 @@ def test_an_evaluator_that_is_named_is_kept(given: dict[str, Any]) -> None:
     assert "exact" in found["exact"]
     assert "cells" not in found["exact"]
     assert ("cells" in found["auto"]) == (not given)  # the program takes nodes where it is cheaper
+
+
+def test_runs_whose_steps_are_limited_by_passing_waves_do_not_vouch_for_each_other() -> None:
+    """They take the same steps and share their errors: what they differ by may be far less than either is off."""
+    wave = {"wheel": {"amplitudes": [2e-6], "wavelengths": [0.004]}}
+    case = promised(
+        {**WAVE, "roughness": wave, "initial": {"at": "equilibrium", "x": 1e-6}},
+        1e-2,
+        wheel__angular_speed=12.0,
+        friction__coefficient=0.0,
+    )
+    system = system_of(case)
+    loose, tight = (solve(system, replace(system.method, tolerance=each)) for each in (1e-6, 1e-8))
+    assert tight.work.steps < 1.02 * loose.work.steps
+    assert errors(loose.rows, tight.rows).error < errors(tight.rows, truth(case, 1e-13)).error
+    found = certify(system)
+    assert found.certificate.certified
+    assert kept(found, case, 1e-13) <= 1e-2
 
 
 @pytest.mark.parametrize(("scheme", "promise"), [("event-driven", 1e-2), ("event-driven", 1e-8), ("auto", 1e-10)])
@@ -241,6 +350,14 @@ def test_a_promise_is_kept_where_an_unstable_shoe_has_no_time_to_leave() -> None
     found = certify(system_of(changed(case, initial={"x": 1e-7}))).certificate
     assert found.certified
     assert found.estimated_error < 1e-6
+
+
+def test_steps_that_do_not_get_there_are_not_certified(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(against, "MOST_RUNS", 1)
+    found = certify(system_of(promised(SQUEAL, 1e-8, solver__scheme="two-layer", solver__duration=0.05)))
+    assert not found.certificate.certified
+    assert found.certificate.estimated_error > 1e-8
+    assert "cannot be certified" in found.certificate.sentence()
 
 
 def test_a_tolerance_below_rounding_is_not_certified_and_says_what_it_can_stand_for(tmp_path: Path) -> None:
@@ -270,3 +387,24 @@ def test_no_friction_no_load_and_no_roughness_are_named_as_left_out() -> None:
     _, left = modelled(found.motion)
     for words in ("quadrature", "there is no friction", "dashpots"):
         assert any(words in sentence for sentence in left), left
+
+
+def test_the_coulomb_oscillator_ends_where_it_must() -> None:
+    case = changed(make(COULOMB), solver={"scheme": "auto", "theta": (), "step": None, "tolerance": 1e-8})
+    found = certify(system_of(changed(case, output={"sample_interval": 0.01})))
+    assert found.certificate.certified
+    start = system_of(case)
+    assert start.samples == len(found.motion.rows) - 1
+    assert found.motion.rows[-1, 0] == pytest.approx(15.0 - 205.0**0.5, abs=1e-8 * 15.0)
+
+
+@pytest.mark.parametrize("later", [0.0, 1e-9, 0.3, 0.9])
+def test_friction_that_turns_at_a_time_that_all_steps_share_is_not_overlooked(later: float) -> None:
+    """The oscillator turns at atan(6/11) + π, so much of a sample interval behind a sample."""
+    interval = (math.atan(6.0 / 11.0) + math.pi) / (64.0 + later)
+    case = promised(
+        COULOMB, 1e-3, solver__duration=5.0, solver__scheme="two-layer", output__sample_interval=interval
+    )
+    found = certify(system_of(case))
+    assert found.certificate.certified
+    assert kept(found, case) <= 1e-3

@@ -129,6 +129,16 @@ def test_an_axis_of_texts_and_a_search_without_axes_have_their_dimension(tmp_pat
     assert report.findings.critical[0] == 1
 
 
+@campaign
+def test_a_search_says_what_it_does_not_find_without_dashpots(tmp_path: Path) -> None:
+    text = 'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
+    rough = CASE + "\n[roughness.wheel]\namplitudes = [1e-9]\nwavelengths = [0.02]\n"
+    for case, bare, warned in ((rough, True, True), (rough, False, False), (CASE, True, False)):
+        loaded = load(tmp_path, text, case, *(["link1.damping=0", "link2.damping=0"] if bare else []))
+        told = inline(loaded, tmp_path / "s.h5", compute_units, force=True).findings.sentences
+        assert any("no dashpot acts: growth that a damping ratio of 1e-05" in each for each in told) is warned
+
+
 def test_a_case_that_is_not_there_is_reported_at_the_key_of_the_sweep(tmp_path: Path) -> None:
     (tmp_path / "s.toml").write_text(
         'title = "a"\ncase = "gone.toml"\n[[axis]]\nparameter = "load.force"\nvalues = [1]'
@@ -154,6 +164,14 @@ def test_points_that_fail_are_listed_and_the_others_are_there(tmp_path: Path) ->
     assert np.isnan(found.amplitude.values[1, 0])
 
 
+def test_a_run_that_fails_numerically_fails_its_point(tmp_path: Path) -> None:
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "contact.stiffness"\nvalues = [2e7, 4e12]\n'
+    case = CASE.replace("solver = {", 'solver = { iteration = "fixed-point", ')
+    report = run(tmp_path, text, case)
+    assert report.findings.failed == 1
+    assert "did not converge" in report.findings.failures[0]["reason"]
+
+
 @pytest.mark.parametrize("direction", ["up", "down"])
 def test_each_point_of_a_followed_axis_starts_where_the_one_before_has_ended(
     tmp_path: Path, direction: str
@@ -174,6 +192,34 @@ def test_each_point_of_a_followed_axis_starts_where_the_one_before_has_ended(
             point = found.sel(wheel_angular_speed=speed).isel(friction_coefficient=place)
             assert float(point.amplitude) == pytest.approx(outcome.verdict.amplitude, rel=1e-9)
     assert report.findings.failed == 0
+
+
+def test_the_wheel_goes_on_turning_from_one_point_to_the_next(tmp_path: Path) -> None:
+    """Following a key that changes nothing is one long run: also its second half starts on the waves it met."""
+    waves = "roughness.wheel = { amplitudes = [2e-6, 0.0, 1e-6], wavelengths = [0.013, 0.5, 0.0071] }\n"
+    case = CASE + waves
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "solver.allow_unconverged"\nvalues = [false, true]\n'
+    loaded = load(tmp_path, text, case)
+    whole = simulate(parse_case(case, "tiny", ["solver.duration=0.8"]).case)
+    first = simulate(loaded.base.case)
+    second = simulate(loaded.plan.case(next_start(first)))
+    # Phases pass through degrees, and the second run starts anew from four numbers: rounding, times its growth.
+    end = second.motion.rows[-1, :4]
+    other = whole.motion.rows[-1, :4]
+    np.testing.assert_allclose(end, other, rtol=1e-6, atol=1e-9 * np.abs(other).max())
+
+
+def test_along_wavelengths_each_wave_goes_on_with_its_phase(tmp_path: Path) -> None:
+    """What a point of the wheel meets changes in its slope there, but not in its height."""
+    waves = "roughness.wheel = { amplitudes = [2e-6], wavelengths = [0.013] }\ninitial.wheel_angle = 0.7\n"
+    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "roughness.wheel.wavelengths"\nvalues = [[0.013], [0.02]]\n'
+    loaded = load(tmp_path, text, CASE + waves)
+    first = simulate(loaded.base.case)
+    nxt = system_of(loaded.plan.case({("roughness", "wheel", "wavelengths"): [0.02], **next_start(first)}))
+    system = first.motion.system
+    case = loaded.base.case
+    met = 0.7 * case.wheel.radius + system.belt_speed * system.sampled_duration
+    assert np.sin(nxt.wheel.phase[0]) == pytest.approx(np.sin(-2.0 * np.pi * met / 0.013), abs=1e-9)
 
 
 def test_lines_go_up_and_down_through_every_point_once() -> None:
@@ -318,6 +364,13 @@ def test_the_summary_and_the_json_carry_the_names_of_the_file(tmp_path: Path) ->
     assert (quiet.code, quiet.out, quiet.err) == (0, "", "")
 
 
+def test_a_sweep_comes_from_standard_input_as_well(tmp_path: Path) -> None:
+    (tmp_path / "tiny.toml").write_text(CASE)
+    done = brakecli("sweep", "-", "--json", "--set", "solver.duration=0.05", cwd=tmp_path, stdin=GRID)
+    assert done.json["output"] == "sweep.h5"
+    assert left_in(tmp_path) == {"tiny.toml", "sweep.h5"}
+
+
 def test_check_names_points_that_will_fail_and_a_sweep_of_them_says_that_all_have_failed(tmp_path: Path) -> None:
     (tmp_path / "tiny.toml").write_text(CASE)
     (tmp_path / "s.toml").write_text(
@@ -376,6 +429,25 @@ def test_tasks_are_as_long_as_their_work_is_short() -> None:
     assert [together.next_task() for _ in range(3)] == [Task(0, 32), Task(32, 8), None]
 
 
+def test_tasks_of_long_sweeps_last_a_second_and_get_shorter_towards_the_end() -> None:
+    queue = TaskQueue(np.zeros(10**5, dtype=bool), None, workers=4)
+    sizes = list[int]()
+    queue.note_time(Task(0, 1000), 4.0)
+    while (task := queue.next_task()) is not None:
+        sizes.append(task.size)
+        left = 10**5 - sum(sizes)
+        assert task.size in (250, 50) or task.size <= 0.01 / 4 * (left + task.size) or not left
+    assert sum(sizes) == 10**5
+    assert sizes == sorted(sizes, reverse=True)
+    assert (sizes[0], sizes[-2]) == (250, 50)  # 1 s and 0.2 s of 4 ms each
+
+
+def test_a_thousand_workers_ask_for_no_more_tasks_than_a_scheduler_hands_out() -> None:
+    queue = TaskQueue(np.zeros(10**6, dtype=bool), None, workers=1000)
+    queue.note_time(Task(0, 1000), 2.0)
+    assert queue.next_task() == Task(0, 5000)  # 10 s of 2 ms each: a hundred tasks a second
+
+
 def test_only_what_is_missing_is_queued_and_lost_units_come_again_one_by_one() -> None:
     finished = np.zeros(10, dtype=bool)
     finished[[0, 4, 5]] = True
@@ -391,26 +463,3 @@ def test_a_record_holds_text_whole_or_cut_between_characters() -> None:
     record = blank(kind, Status.FAILED, "ß" * 200)
     assert record["reason"][0].decode() == "ß" * 120
     assert record["status"][0] == b"failed"
-
-
-def test_along_wavelengths_each_wave_goes_on_with_its_phase(tmp_path: Path) -> None:
-    """What a point of the wheel meets changes in its slope there, but not in its height."""
-    waves = "roughness.wheel = { amplitudes = [2e-6], wavelengths = [0.013] }\ninitial.wheel_angle = 0.7\n"
-    text = 'case = "tiny.toml"\n[[axis]]\nparameter = "roughness.wheel.wavelengths"\nvalues = [[0.013], [0.02]]\n'
-    loaded = load(tmp_path, text, CASE + waves)
-    first = simulate(loaded.base.case)
-    nxt = system_of(loaded.plan.case({("roughness", "wheel", "wavelengths"): [0.02], **next_start(first)}))
-    system = first.motion.system
-    case = loaded.base.case
-    met = 0.7 * case.wheel.radius + system.belt_speed * system.sampled_duration
-    assert np.sin(nxt.wheel.phase[0]) == pytest.approx(np.sin(-2.0 * np.pi * met / 0.013), abs=1e-9)
-
-
-@campaign
-def test_a_search_says_what_it_does_not_find_without_dashpots(tmp_path: Path) -> None:
-    text = 'case = "tiny.toml"\n[critical]\nparameter = "friction.coefficient"\nlower = 0.3\nupper = 0.9\n'
-    rough = CASE + "\n[roughness.wheel]\namplitudes = [1e-9]\nwavelengths = [0.02]\n"
-    for case, bare, warned in ((rough, True, True), (rough, False, False), (CASE, True, False)):
-        loaded = load(tmp_path, text, case, *(["link1.damping=0", "link2.damping=0"] if bare else []))
-        told = inline(loaded, tmp_path / "s.h5", compute_units, force=True).findings.sentences
-        assert any("no dashpot acts: growth that a damping ratio of 1e-05" in each for each in told) is warned
