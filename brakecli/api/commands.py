@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from brakecli.api.measured import look_at, quantity_of
+from brakecli.api.measured import look_at, perhaps_a_signal, quantity_of
 from brakecli.api.values import (
     axis_of,
     chosen_of,
@@ -188,7 +188,8 @@ def plot(options: Plot, source: str, target: Path) -> tuple[Figure, Sequence[str
     section = text_of(options.section, "section")
     if quantity_of(options, source) is None:
         select = chosen_of(options.select, "select")
-        return plot_result(Path(source), target, select, variable, section, force=options.force), []
+        with perhaps_a_signal(source):
+            return plot_result(Path(source), target, select, variable, section, force=options.force), []
     if options.select or variable or section:
         names = f"{argument('select')}, {argument('variable')} and {argument('section')}"
         raise UsageError(f"{names}: are for results; leave them out for a measured signal")

@@ -1,6 +1,8 @@
 """How a signal was measured: what options of `classify` and `plot` say of it."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import fields
 from numbers import Real
 from pathlib import Path
@@ -8,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 from brakecli.api.records import Classify, Plot, Signal
 from brakecli.api.values import plain, text_of
-from brakecli.errors import UsageError, printable
+from brakecli.errors import OtherKindError, UnreadableResultError, UsageError, printable
 from brakecli.faces import argument
+from brakecli.results.opening import is_hdf5
 
 if TYPE_CHECKING:
     from brakecli.analysis.signals.look import SignalLook
@@ -17,6 +20,21 @@ if TYPE_CHECKING:
 
 NUMBERS = ("sample_rate", "belt_speed", "stiffness")
 OF_MACHINE = ("belt_speed", "stiffness")
+
+
+@contextmanager
+def perhaps_a_signal(source: str) -> Iterator[None]:
+    """Say of a file that is no result how a measured signal is named."""
+    try:
+        yield
+    except OtherKindError:
+        raise
+    except UnreadableResultError as error:
+        remedy = f"for a measured signal, state with {argument('quantity')} what was measured"
+        problem, _, otherwise = str(error).rpartition("; ")
+        if is_hdf5(Path(source)) or not problem:
+            raise UnreadableResultError(f"{error}; {remedy}") from error
+        raise UnreadableResultError(f"{problem}; {remedy}; or {otherwise}") from error
 
 
 def quantity_of(options: Classify | Plot, source: str) -> str | None:

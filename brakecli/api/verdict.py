@@ -7,12 +7,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from brakecli.api.measured import look_at, quantity_of
+from brakecli.api.measured import look_at, perhaps_a_signal, quantity_of
 from brakecli.api.records import Classify
 from brakecli.api.values import chosen_of
-from brakecli.errors import OtherKindError, UnreadableResultError, UsageError
+from brakecli.errors import UsageError
 from brakecli.faces import argument
-from brakecli.results.opening import is_hdf5
 
 if TYPE_CHECKING:
     from brakecli.analysis.regime.decision import Thresholds
@@ -45,16 +44,8 @@ def _on_result(source: str, thresholds: list[str] | None) -> dict[str, object]:
     from brakecli.studies.runs.stored import classify_result
 
     limits = changed(Thresholds, thresholds)
-    try:
+    with perhaps_a_signal(source):
         return classify_result(Path(source), limits)
-    except OtherKindError:
-        raise
-    except UnreadableResultError as error:
-        remedy = f"for a measured signal, state with {argument('quantity')} what was measured"
-        problem, _, otherwise = str(error).rpartition("; ")
-        if is_hdf5(Path(source)) or not problem:
-            raise UnreadableResultError(f"{error}; {remedy}") from error
-        raise UnreadableResultError(f"{problem}; {remedy}; or {otherwise}") from error
 
 
 def changed(thresholds: type[_Limits], changes: list[str] | None) -> _Limits:

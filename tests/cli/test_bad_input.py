@@ -220,6 +220,8 @@ def test_a_number_with_a_unit_is_told_of_its_option(tmp_path: Path) -> None:
 
 def test_a_text_file_without_its_quantity_is_told_of_that_first(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_text("t,a\n0,1\n")
-    done = brakecli("classify", "x.csv", cwd=tmp_path)
     remedy = "state with --quantity what was measured; or name an intact result file, or compute it again"
-    assert f"this is not an HDF5 file; for a measured signal, {remedy}" in done.err
+    for command in ("classify", "plot"):
+        brakecli(command, "x.csv", cwd=tmp_path).told(
+            4, f"this is not an HDF5 file; for a measured signal, {remedy}"
+        )
