@@ -65,12 +65,9 @@ def copy(tmp_path_factory: pytest.TempPathFactory) -> Path:
         '    elif p.grid.scheme == list(SCHEMES).index("backward-euler"):\n'
         "        backward_euler.finish(p.c, p.s, state, problem, contact, work)\n",
     )
-    for path, words in (
-        (steps, "three_layer, two_layer"),
-        (package / "solver/contact/force.py", "auto, closed_form, exact, midpoint"),
-    ):
-        own = "backward_euler" if path is steps else "spring"
-        path.write_text(path.read_text().replace(f"{words}\n", f"{words}, {own}\n", 1))
+    for path, own in ((steps, "backward_euler"), (package / "solver/contact/force.py", "spring")):
+        line = f"from brakecli.solver.{path.parent.name} import {own}\n"
+        insert(path, "from brakecli.solver.kernels import", line)
     text = TINY.replace("step = 1e-5,", 'scheme = "backward-euler", step = 1e-5,')
     (folder / "same.toml").write_text(TINY.replace("step = 1e-5,", "theta = [1.0, 1.0], step = 1e-5,"))
     (folder / "own.toml").write_text(text.replace("stiffness = 2e7 }", 'stiffness = 2e7, evaluator = "spring" }'))

@@ -3,7 +3,7 @@
 An error obeys the derivative of the steps, as a disturbance does, with what each step adds. Of the steps that is
 what the motion misses of the scheme with steps twice as long, over what such steps miss more than these. Every
 second level has one, and counts twice: one at every level would add up to nothing where a patch opens or closes.
-Of the nodes it is what `contact.midpoint.left_out` finds at every second level.
+Of the nodes it is what `contact.cells.left_out` finds at every second level.
 """
 
 import math

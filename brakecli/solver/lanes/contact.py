@@ -111,7 +111,7 @@ def _cut(gaps: Floats, j: int, n: int) -> tuple[float, float]:
 
 @kernel(fastmath=ALIKE, inline=False)
 def leave_out(o: Lane, gaps: Floats, spacing: float) -> None:
-    """`contact.midpoint.left_out` of pads that touch in part, where the contact was evaluated last.
+    """`contact.cells.left_out` of pads that touch in part, where the contact was evaluated last.
 
     From both ends to the middle, where both halves find an edge: a pair of two such cells takes one division.
     """

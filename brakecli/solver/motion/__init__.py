@@ -2,7 +2,7 @@
 
 `exact` multiplies by matrices, on smooth pads, in the loop of `advance`. `runge_kutta` steps by the `forces` of a
 rough contact: `steps` chooses each step by its error, `between` loops over them from sample to sample, and `grid`
-takes a fixed number. Whoever fills the record (`samples`, `between`, `flow`) sets `propagator`.
+takes a fixed number. Whoever fills the record (`samples`, `steps`, `flow`) sets `propagator`.
 
 A propagator carries the block of a motion (`block.Block`) from event to event.
 
@@ -20,8 +20,8 @@ A propagator carries the block of a motion (`block.Block`) from event to event.
     which `grid` asks itself. All is in the record, to go on to the bit. A step of `steps`, and what samples a loop
     (`samples`, `between`), return a `Failure`.
 
-A third one has a number beside `block.MATRICES`, and a record in the plant; branches in `enter_phase`, `look`
-and `pass_event` of `events` and in `jump` and `hold_on` of `columns`, where what is not matrices is Runge-Kutta; a
-loop as those of `advance`, `between` and `grid`, which finds its first phase; what samples it; and an entry in
-`tasks`. A case can name it once a scheme does.
+A third one has a number beside `block.MATRICES`, and a record in the plant if it needs one; branches in
+`enter_phase`, `look` and `pass_event` of `events` and in `jump` and `hold_on` of `columns`, where what is not
+Runge-Kutta is matrices; a loop as those of `advance`, `between` and `grid`, which finds its first phase; what
+samples it; and an entry in `tasks`. A case can name it once a scheme does.
 """

@@ -14,7 +14,7 @@ lost or made, no force jumps: f' = f, and it is the identity.
 
 import math
 
-from brakecli.solver.block import COLUMNS, MATRICES, RUNGE_KUTTA, TERMS, V_X, V_Y, Block, Exact, X, Y
+from brakecli.solver.block import COLUMNS, RUNGE_KUTTA, TERMS, V_X, V_Y, Block, Exact, X, Y
 from brakecli.solver.double_double import ROUNDING
 from brakecli.solver.kernels import kernel
 from brakecli.solver.motion import exact, forces
@@ -103,7 +103,7 @@ def _round(e: Exact, m: Block) -> None:
 def jump(p: Plant) -> bool:
     """Take the columns through the event at the end of the last step; False where it is only grazed."""
     m = p.block
-    falls = exact.falls(p.exact, m) if m.propagator == MATRICES else forces.falls(p)
+    falls = forces.falls(p) if m.propagator == RUNGE_KUTTA else exact.falls(p.exact, m)
     if falls >= 0.0:
         return False
     for j in range(m.count):

@@ -8,7 +8,6 @@ from brakecli.solver.block import (
     BELT_SLOPE,
     LOAD,
     LOAD_SLOPE,
-    MATRICES,
     RUNGE_KUTTA,
     SIZE,
     V_X,
@@ -73,10 +72,10 @@ def anchor(p: Plant, scratch: Floats) -> None:
 def look(p: Plant) -> None:
     """What the next step needs to know of the motion reached."""
     m = p.block
-    if m.propagator == MATRICES:
-        exact.look(p.exact, m.phase, m.z)
-    else:
+    if m.propagator == RUNGE_KUTTA:
         forces.renew(p)
+    else:
+        exact.look(p.exact, m.phase, m.z)
 
 
 @kernel
