@@ -304,7 +304,7 @@ def answers(numbers: dict[str, Any]) -> str:
     """The row and the answers, in words."""
     evidence = numbers["evidence"]
     lines = [f"“{evidence['row'].partition(':')[0]}”"]
-    if "change" in evidence:
+    if "level_change" in evidence:
         lines.append(level(evidence))
     if numbers["growth_rate"] is not None:
         lines.append(f"theory: {numbers['growth_rate']:.3g} 1/s")

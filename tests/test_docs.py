@@ -99,7 +99,8 @@ def test_every_example_of_the_regimes_has_the_verdict_in_its_picture(monkeypatch
     monkeypatch.syspath_prepend(ROOT / "docs")  # where `make regime-pictures` finds it
     pictures = importlib.import_module("regime_pictures")
     for example in (*pictures.SMOOTH, *pictures.ROUGH, *pictures.LOOKS):
-        pictures.both(example._replace(after=0.0))  # ends where another row has decided
+        shown, _ = pictures.both(example._replace(after=0.0))  # ends where another row has decided
+        assert ("level: " in pictures.answers(shown.numbers)) is ("level_change" in shown.numbers["evidence"])
 
 
 def test_every_name_of_stability_is_documented() -> None:

@@ -28,6 +28,7 @@ _APART = {
     "format_version",
     "complete",
 }
+"""Attributes that differ between any two results, or are compared key by key."""
 _RISING = ("time", "frequency")  # axes along which values are interpolated
 
 HELD = (
@@ -206,7 +207,8 @@ def _variables(a: StoredResult, b: StoredResult, group: str) -> Iterator[Differe
         along = None
         if all(shapes) and shapes[0][1:] == shapes[1][1:]:
             along = _other_places(a, b, group, pair)
-            for one, other in (_pairs if along is None else _interpolated)(a, b, group, name, along or ""):
+            rows = _interpolated(a, b, group, name, along) if along else _pairs(a, b, group, name)
+            for one, other in rows:
                 numeric = not coded and one.dtype.kind in "iuf" and other.dtype.kind in "iuf"
                 apart = one != other
                 if numeric:
@@ -240,7 +242,7 @@ def _other_places(a: StoredResult, b: StoredResult, group: str, pair: list[Varia
     return axis if any((one != other).any() for one, other in _pairs(a, b, group, axis)) else None
 
 
-def _pairs(a: StoredResult, b: StoredResult, group: str, name: str, _: str = "") -> Iterator[tuple[Any, Any]]:
+def _pairs(a: StoredResult, b: StoredResult, group: str, name: str) -> Iterator[tuple[Any, Any]]:
     """The rows of a variable in both results, up to the end of the shorter one."""
     rows = min(result.variables(group)[name].shape[0] for result in (a, b))
     for start in range(0, rows, BLOCK):
@@ -249,7 +251,10 @@ def _pairs(a: StoredResult, b: StoredResult, group: str, name: str, _: str = "")
 
 
 def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis: str) -> Iterator[tuple[Any, Any]]:
-    """A variable where the result with fewer rows in the common range has it; states are those of the nearest."""
+    """A variable of both results at the places of the one that has fewer in the range of both; in blocks.
+
+    Numbers of the other one are interpolated along the axis, states are those of its nearest row.
+    """
 
     def row(result: StoredResult, position: float) -> int:
         rows = range(result.variables(group)[axis].shape[0])
@@ -259,13 +264,13 @@ def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis:
     first = max(low for low, _ in ends)
     last = min(high for _, high in ends)
     parts = [range(row(result, first), row(result, math.nextafter(last, math.inf))) for result in (a, b)]
-    swapped = len(parts[1]) < len(parts[0])
-    one, other, span = (b, a, parts[1]) if swapped else (a, b, parts[0])
+    second_is_coarser = len(parts[1]) < len(parts[0])
+    coarse, fine, span = (b, a, parts[1]) if second_is_coarser else (a, b, parts[0])
     for start in span[::BLOCK]:
         stop = min(start + BLOCK, span.stop)
-        at, values = (one.read(group, variable, start, stop) for variable in (axis, name))
-        near = max(row(other, at[0]) - 1, 0), row(other, at[-1]) + 1
-        places, there = (other.read(group, variable, *near) for variable in (axis, name))
+        at, values = (coarse.read(group, variable, start, stop) for variable in (axis, name))
+        around = max(row(fine, at[0]) - 1, 0), row(fine, at[-1]) + 1
+        places, there = (fine.read(group, variable, *around) for variable in (axis, name))
         where = np.interp(at, places, np.arange(len(places)))
         low = np.floor(where).astype(int)
         high = np.ceil(where).astype(int)
@@ -275,4 +280,4 @@ def _interpolated(a: StoredResult, b: StoredResult, group: str, name: str, axis:
             between = np.where(present, there[low] + weight * (there[high] - there[low]), FILL)
         else:
             between = there[np.round(where).astype(int)]
-        yield (between, values) if swapped else (values, between)
+        yield (between, values) if second_is_coarser else (values, between)

@@ -47,7 +47,9 @@ class Slips:
     @property
     def stick_slip(self) -> bool:
         """Whether they can be slips between sticks."""
-        return self.lasts >= 0.55 and self.swings <= 0.6 and self.loaded
+        least_lasting = 0.55  # of a slip: a spike and a ring-down leave nothing a quarter of a cycle later
+        most_swinging = 0.6  # of a slip, the other way: what is struck swings back by as much as it was moved
+        return self.lasts >= least_lasting and self.swings <= most_swinging and self.loaded
 
 
 def seek(velocity: Velocity, certain: float) -> Slips:
@@ -75,7 +77,8 @@ def seek(velocity: Velocity, certain: float) -> Slips:
     noise = float(np.sqrt(velocity.noise_at(scale)))
     spread = middle + 3.0 * DEVIATION * float(np.median(np.abs(bulk - middle))) if largest >= certain else 0.0
     high = max(0.5 * middle, sure * noise, spread)
-    places = rises(-values, -0.25 * middle, high)  # of the velocity in stick, the other way: a slip has begun
+    begun = -0.25 * middle  # the other way by a quarter of the velocity in stick, a slip has begun
+    places = rises(-values, begun, high)
     slips = Slips(largest, scale, places, stick=float(np.mean(values > -high)))
     return _shaped(slips, chosen) if slips.count >= _FEWEST else slips
 
@@ -92,7 +95,9 @@ def _shaped(slips: Slips, velocity: Velocity) -> Slips:
     x = np.concatenate([[0.0], np.cumsum(velocity.values)])
     # Where impulses and noise make the largest falls, a smoothed displacement shows where slips are.
     starts, depths = _falls(uniform_filter1d(x, 1 + scale // 2), slips.places, scale)
-    strong = depths >= 0.4 * np.sort(depths)[-min(_FEWEST, len(depths)) :][0] if len(depths) else depths > 0.0
+    if not len(depths):
+        return slips
+    strong = depths >= 0.4 * np.sort(depths)[-min(_FEWEST, len(depths))]  # of the tenth largest
     if strong.sum() < 3:  # the shape of weaker ones is not looked at
         return slips
     lasts = _lasting(x, starts[strong], scale) / max(float(depths[strong].mean()), 1e-300)
@@ -110,19 +115,28 @@ def _falls(x: Array, places: NDArray[np.intp], scale: int) -> tuple[NDArray[np.i
 
 
 def _returning(x: Array, starts: NDArray[np.intp], fine: int, scale: int) -> float:
-    """How far the velocity swings the other way after slips, over them; both beyond what it does between slips."""
+    """How far the velocity swings the other way around a slip, over the slip itself, in the median.
+
+    Both count beyond what windows of the same length do in the middle between slips: that is noise and hum.
+    """
     near = (x[fine:] - x[:-fine]) / fine
     waits = np.diff(starts)
     wide = int(min(max(_AROUND * scale, 0.125 * len(x) / len(starts)), 0.4 * np.median(waits))) + 1
     long = waits >= np.median(waits)
     between = starts[:-1][long] + waits[long] // 2
     exact = sliding_window_view(near, 2 * scale)
-    starts = starts + exact[np.minimum(starts, len(exact) - 1)].argmin(axis=1)
-    windows = sliding_window_view(near, wide)
-    places = (np.clip(i - wide // 4, 0, len(near) - wide)[:: 1 + len(i) // _MOST] for i in (starts, between))
-    ends = ((windows[i].min(axis=1), windows[i].max(axis=1)) for i in places)
-    (low, high), (least, most) = (map(np.median, bounds) for bounds in ends)
-    return float((high - most) / max(least - low, 0.25 * (most - least), 1e-300))
+    fastest = starts + exact[np.minimum(starts, len(exact) - 1)].argmin(axis=1)
+    low, high = _median_ends(near, fastest, wide)
+    least, most = _median_ends(near, between, wide)
+    slip = max(least - low, 0.25 * (most - least), 1e-300)  # no less than a quarter of what is between
+    return float((high - most) / slip)
+
+
+def _median_ends(values: Array, places: NDArray[np.intp], wide: int) -> tuple[float, float]:
+    """Medians of the least and the largest value in windows that begin a quarter before places."""
+    few = np.clip(places - wide // 4, 0, len(values) - wide)[:: 1 + len(places) // _MOST]
+    windows = sliding_window_view(values, wide)[few]
+    return float(np.median(windows.min(axis=1))), float(np.median(windows.max(axis=1)))
 
 
 def _around(values: Array, starts: NDArray[np.intp], before: int, after: int) -> Array:
