@@ -115,7 +115,7 @@ class Answers:
     @cached_property
     def _lost_at(self) -> list[float]:
         """Where it goes on, and nobody knows how: no branch passes through that motion, or none was followed."""
-        cut = [point.p for _, point in self._cut_ends if not self._is_passed(point)]
+        cut = [point.p for end, point in self._cut_ends if end.kind != "met" and not self._is_passed(point)]
         return cut + self.explored.unfollowed
 
     def _is_passed(self, motion: Point) -> bool:

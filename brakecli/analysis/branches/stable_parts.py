@@ -11,8 +11,8 @@ NARROWEST = 1e-6
 """Part of the range below which an interval is that of rounding."""
 Span = tuple[float, float]
 """Two places of the line, the lower one first."""
-CUT = {"lost", "points", "seconds", "interrupted", "start"}
-"""Ends of a branch beyond which the motion goes on, unknown."""
+CUT = {"lost", "met", "points", "seconds", "interrupted", "start"}
+"""Ends of a branch beyond which the motion goes on; where it has met followed ones, as these."""
 
 
 class Part(NamedTuple):
