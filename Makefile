@@ -100,7 +100,7 @@ test: $(DEV_STAMP) ## run the tests; PYTEST_ARGS='-k friction' narrows them down
 	@$(KERNELS)
 	$(BIN)/python $(PYTEST) $(PYTEST_ARGS)
 
-campaign: $(DEV_STAMP) docs ## run long tests and statistics, of most of which make test has a smaller part (ten minutes)
+campaign: $(DEV_STAMP) docs ## run long tests and statistics, of most of which make test has a smaller part (16 minutes)
 	@$(KERNELS)
 	$(BIN)/python $(PYTEST) -n3 -m campaign $(PYTEST_ARGS) # one more, as many of these wait for seconds
 
