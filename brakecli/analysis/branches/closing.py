@@ -23,9 +23,7 @@ def turned_back(points: list[Point], new: Point, border: float) -> bool:
     """Whether the branch has come back across a border and runs back over itself."""
     if new.word == points[-1].word:
         return False
-    reach = (
-        10.0 * border
-    )  # strides with which borders are crossed; a branch that runs back meets a late point again
+    reach = 10.0 * border  # within so many strides across a border it meets a late point again
     for point in points[:-21:-1]:
         if point.chart is new.chart and point.word == new.word:
             chord = new.z - point.z

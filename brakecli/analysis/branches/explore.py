@@ -1,6 +1,7 @@
 """All branches of a case along a line: steady sliding, and the motions that are born where it loses stability."""
 
 import math
+from bisect import bisect_left
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
@@ -361,9 +362,9 @@ def crossed(problem: Problem, branch: Branch) -> list[Point]:
     motions: list[Point] = []
     for special in branch.specials:
         if special.kind == "branch point":
-            before = max((point for point in branch.points if point.s < special.s), key=lambda point: point.s)
-            after = min((point for point in branch.points if point.s > special.s), key=lambda point: point.s)
-            motions += crossing_sheet(newton, special.point, after.z - before.z)
+            k = bisect_left(branch.points, special.s, 1, len(branch.points) - 1, key=lambda point: point.s)
+            way = branch.points[k].z - branch.points[k - 1].z
+            motions += crossing_sheet(newton, special.point, way)
     return motions
 
 
